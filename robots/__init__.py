@@ -27,6 +27,7 @@ from sphshell_pin.robots.files import read as read
 from sphshell_pin.robots.finding import is_library_name as is_library_name
 from sphshell_pin.robots.finding import library_source as library_source
 from sphshell_pin.robots.inertia import few
+from sphshell_pin.robots.inertia import joints_without_mass as joints_without_mass
 from sphshell_pin.robots.inertia import mass_fault as mass_fault
 from sphshell_pin.robots.inertia import with_density as with_density
 from sphshell_pin.robots.mesh_spheres import MeshSpheres as MeshSpheres

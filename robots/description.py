@@ -85,6 +85,15 @@ def check_tree(root: ET.Element) -> None:
             )
 
 
+def fix_root(root: ET.Element) -> None:
+    """Fix the links of a URDF to its root link that joints of type floating leave free there."""
+    moved = {str(one.get("link")) for one in root.iterfind("joint/child")}
+    for joint in root.iterfind("joint[@type='floating']"):
+        parent = joint.find("parent")
+        if parent is not None and parent.get("link") not in moved:
+            joint.set("type", "fixed")
+
+
 def add_limits(root: ET.Element) -> Iterator[str]:
     """Set limits that urdfdom asks for, or that are negative, to 0, which states none; say so."""
     kinds = ("revolute", "prismatic")
@@ -92,7 +101,9 @@ def add_limits(root: ET.Element) -> Iterator[str]:
         one for one in root.iter("joint") if one.get("type") in kinds and one.find("limit") is None
     ]
     for joint in bare:
-        ET.SubElement(joint, "limit", effort="0", velocity="0")
+        ET.SubElement(joint, "limit")
+    for limit in root.iterfind("joint/limit"):
+        limit.attrib.update({"effort": "0", "velocity": "0"} | limit.attrib)
     if bare:
         yield f"without limits of the joints {_names(bare)}: they have no <limit>"
     for key in ("effort", "velocity"):

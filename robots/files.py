@@ -27,6 +27,7 @@ from sphshell_pin.robots.description import (
     check_size,
     check_tree,
     drop_empty_shapes,
+    fix_root,
     frames_without_link,
     mimics_of,
     parsed,
@@ -77,7 +78,8 @@ def read(
 ) -> Description:
     """Read a URDF, xacro or MJCF file.
 
-    `free_flyer` frees the base of an MJCF or fixes it; None: as the file states it.
+    `free_flyer` frees the base of an MJCF or fixes it, False also that of a URDF with a floating
+    joint; None: as the file states it.
     Raises RobotError, with the reason in a sentence, and MissingExtra for a xacro file without the
     package xacro.
     """
@@ -123,6 +125,8 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
 
             return read_mjcf(root, folders, floats=free_flyer)
         notes = list[str]()
+        if free_flyer is False:
+            fix_root(root)
         frames = frames_without_link(root)
         if frames and (folders.kept is not None or including(file) is None):
             for name in frames:
@@ -343,9 +347,14 @@ def _check_root(model: pin.Model, file: Path) -> None:
     if least <= 1e-12 * most:
         bodies = [one.name for one in model.frames if one.parentJoint == 1]
         link = next((name for name in bodies if name != model.names[1]), model.names[1])
+        advice = (
+            "give it an <inertial>, or the folder of its meshes, --package-dir, and a --density"
+        )
+        if model.njoints > 2:
+            advice += "; or fix it: without --free-flyer (free_flyer), in new with --base fixed"
         raise RobotError(
             f"{file}: the root link '{link}' is to float but has no mass, nor has what is fixed to "
-            "it: give it an <inertial>, or leave out the free-flyer (--free-flyer, free_flyer)"
+            f"it: {advice}"
         )
 
 

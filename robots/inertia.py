@@ -20,7 +20,7 @@ from sphshell_pin.robots.files import build_geometry, build_model, keep_geometry
 from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.shell.shell import Shell
 
-# Of a link whose geometry keeps a place, at most that part of the heaviest link's mass.
+# A mass that keeps a place for one that the file does not state, as a part of the heaviest link's.
 _SPECK = 1e-5
 # Names that a sentence lists; a part of the largest inertia below which a joint moves no mass.
 _LISTED, _NONE = 8, 1e-14
@@ -40,7 +40,7 @@ def with_density(description: Description, density: float) -> tuple[Description,
     model = build_model(description)
     frames = {f.name: k for k, f in enumerate(model.frames) if f.type == pin.FrameType.BODY}
     for kind in ("collision", "visual"):
-        speck = _SPECK * max(added.values(), default=0.0)
+        speck = max(_speck(description), _SPECK * max(added.values(), default=0.0))
         bare = [one for one in root.findall("link") if not (_mass(one) > speck and _turns(one))]
         part = copy.deepcopy(description)
         keep_geometry_of(part, {one.get("name", "") for one in bare}, kind)
@@ -72,26 +72,36 @@ def with_density(description: Description, density: float) -> tuple[Description,
     return replace(description, root=root), "; ".join(told)
 
 
-def lacks_masses(model: pin.Model, description: Description | None, *, floating: bool) -> bool:
-    """Whether geometry can give a URDF's moving bodies what its file does not state.
+def lacks_moments(description: Description | None) -> bool:
+    """Whether a URDF of meshes states masses, and no moment of inertia."""
+    if description is None or description.is_mjcf:
+        return False
+    stated = [one for one in description.root.findall("link") if _mass(one)]
+    meshes = any(one.find(".//mesh") is not None for one in stated)
+    return meshes and not any(map(_turns, stated))
 
-    That is the mass of a body that has none, or every moment of inertia. With `floating` the root
-    link moves too, though it is fixed in `model`.
+
+def lacks_masses(model: pin.Model, description: Description | None, *, floating: bool) -> bool:
+    """Whether a body that moves has no mass, and geometry that can give it one.
+
+    With `floating` the root link of a URDF moves too, though it is fixed in `model`.
     """
     if description is None or description.is_mjcf:
         return False
-    links = description.root.findall("link")
-    stated = [one for one in links if _mass(one)]
-    if any(one.find(".//mesh") is not None for one in stated) and not any(map(_turns, stated)):
-        return True
+    links, speck = description.root.findall("link"), _speck(description)
     bodies = {f.name: f.parentJoint for f in model.frames if f.type == pin.FrameType.BODY}
     empty = (
         one
         for one in links
         if ((joint := bodies.get(one.get("name"), 0)) or floating)
-        and not model.inertias[joint].mass > 0
+        and model.inertias[joint].mass <= speck
     )
     return any(_has_geometry(one, description) for one in empty)
+
+
+def _speck(description: Description) -> float:
+    """Return the mass [kg] up to which a link of a URDF counts as one without."""
+    return _SPECK * max(map(_mass, description.root.findall("link")), default=0.0)
 
 
 def _turns(link: ET.Element) -> bool:
@@ -101,6 +111,16 @@ def _turns(link: ET.Element) -> bool:
     return any(number_of(one) for one in moments)
 
 
+def joints_without_mass(model: pin.Model, q: Array) -> list[str]:
+    """Return the joints that move no mass, at any configuration q (nq,)."""
+    inertia = np.diag(mass_matrix(model, q))
+    return [
+        name
+        for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
+        if joint.nv and inertia[joint.idx_v] <= _NONE * inertia.max(initial=0.0)
+    ]
+
+
 def mass_fault(
     model: pin.Model, q: Array, description: Description | None, lock: Collection[str] = ()
 ) -> str | None:
@@ -108,14 +128,7 @@ def mass_fault(
 
     `q` (nq,) is any configuration.
     """
-    inertia = np.diag(mass_matrix(model, q))
-    bare = [
-        name
-        for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True)
-        if name not in lock
-        and joint.nv
-        and inertia[joint.idx_v] <= _NONE * inertia.max(initial=0.0)
-    ]
+    bare = [name for name in joints_without_mass(model, q) if name not in lock]
     if not bare:
         return None
     said = f"nothing that joint '{bare[0]}' moves has a mass"

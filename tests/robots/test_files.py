@@ -101,6 +101,13 @@ def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
         assert robots.load_file(file).collision_model.ngeoms == 0
 
 
+def test_a_limit_without_effort_and_velocity_states_none(tmp_path):
+    file = arm(tmp_path)
+    text = re.sub(r"<limit[^>]*/>", '<limit lower="-1" upper="2"/>', file.read_text())
+    file.write_text(text.replace("continuous", "revolute"))
+    assert robots.load_file(file).model.upperPositionLimit == 2
+
+
 def test_a_joint_without_a_limit_element_has_no_limits(tmp_path):
     file = arm(tmp_path)
     text = re.sub(r"<limit[^>]*/>", "", file.read_text())
@@ -147,8 +154,9 @@ def test_part_of_a_robot_asks_for_the_file_that_includes_it(tmp_path, text):
 
 
 def test_a_massless_root_cannot_float(tmp_path):
-    with pytest.raises(robots.RobotError, match=r"root link 'a' is to float but has no mass"):
+    with pytest.raises(robots.RobotError, match=r"root link 'a' is to float but has no mass") as e:
         robots.load_file(arm(tmp_path), free_flyer=True)
+    assert "without --free-flyer" in str(e.value)
     # What is fixed to it counts: usual in ROS.
     text = arm(tmp_path).read_text().replace("continuous", "fixed")
     (tmp_path / "fixed.urdf").write_text(text)
@@ -287,3 +295,12 @@ def test_wrong_mimic_joints_are_named(tmp_path, of, ratio, words):
     file.write_text(file.read_text().replace("</joint>", MIMIC.format(of, ratio) + "</joint>"))
     with pytest.raises(robots.RobotError, match=words):
         robots.load_file(file, mimic=True)
+
+
+def test_a_floating_joint_of_a_urdf_is_fixed_where_the_base_is_to_be(tmp_path):
+    text = arm(tmp_path).read_text()
+    free = '<joint name="f" type="floating"><parent link="world"/><child link="a"/></joint>'
+    text = text.replace("</robot>", f'<link name="world"/>{free}</robot>')
+    (tmp_path / "free.urdf").write_text(text)
+    assert robots.load_file(tmp_path / "free.urdf").model.nv == 7
+    assert robots.load_file(tmp_path / "free.urdf", free_flyer=False).model.nv == 1

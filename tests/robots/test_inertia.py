@@ -9,6 +9,7 @@ import pytest
 from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, RobotWarning
+from sphshell_pin.robots.inertia import lacks_masses
 from sphshell_pin.robots.mending import mended
 from sphshell_pin.study.robot_check import QUICK, check_robot
 from tests import meshes, urdf
@@ -216,5 +217,15 @@ def test_a_speck_of_collision_geometry_is_no_mass_where_the_link_is_drawn(tmp_pa
     ]
     links = [urdf.link(*parts, drawn) for parts in zip("ab", solids, strict=True)]
     file = urdf.write(tmp_path / "arm.urdf", *links, urdf.joint("j", "continuous", "a", "b"))
+    model = robots.load_file(file, density=1000.0).model
+    assert model.inertias[1].mass == pytest.approx(1.0)
+
+
+def test_a_mass_that_only_keeps_a_place_is_none(tmp_path: Path) -> None:
+    box = urdf.shape("collision", '<box size="0.1 0.1 0.1"/>')
+    links = urdf.link("a", urdf.inertial(100)), urdf.link("b", urdf.inertial(1e-6, 1e-6), box)
+    file = urdf.write(tmp_path / "arm.urdf", *links, urdf.joint("j", "continuous", "a", "b"))
+    robot = robots.load_file(file)
+    assert lacks_masses(robot.model, robot.description, floating=False)
     model = robots.load_file(file, density=1000.0).model
     assert model.inertias[1].mass == pytest.approx(1.0)

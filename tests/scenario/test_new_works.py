@@ -62,6 +62,14 @@ def test_a_sphere_away_from_its_frame_presses_and_follows_its_path(place, draft)
     assert np.linalg.norm(away - normal * (away @ normal)) < 0.25 * pair.side_i.sphere.radius
 
 
+def test_a_limb_comes_into_a_bowl_from_above(draft):
+    made = draft(PROBE, "bowl")
+    assert any("through the upper half of the bowl" in one for one in made.why)
+    result = run_well(made.built)
+    control = made.built.scenario.controller
+    assert held(made.built, result) == pytest.approx(control.normal_force, rel=0.05)
+
+
 def test_a_hard_tip_settles(draft):
     made = draft(PROBE, "plane", material="steel")
     result, _ = simulate(made.built)
@@ -289,9 +297,17 @@ def pressing(points, **changes):
         Tip("tip", 0.1, np.zeros(3), ""),
         dict.fromkeys(("mass", "slide_mass", "fastest"), 1),
     )
-    stance = SimpleNamespace(tip=tip, **ones, inertia=0.0, joints=4, joint_inertia=np.ones(4))
+    stance = SimpleNamespace(
+        tip=tip,
+        **ones,
+        inertia=0.0,
+        joints=4,
+        joint_inertia=np.ones(4),
+        aside=np.zeros(3),
+        slide=np.eye(3)[0],
+    )
     pair = Materials(find_material("rubber"), find_material("steel"))
-    place = SimpleNamespace(stance=stance)
+    place = SimpleNamespace(stance=stance, placement=pin.SE3.Identity())
     return Press(place, Way(np.array(points)), pair, 1.0, 1e-3, **changes)
 
 

@@ -9,11 +9,16 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.robots import LoadedRobot
-from sphshell_pin.scenario.drafting.fingertips import every_finger, find_tips, other_ends
+from sphshell_pin.scenario.drafting.fingertips import (
+    every_finger,
+    find_tips,
+    only_turns,
+    other_ends,
+)
 from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_joints
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
-from sphshell_pin.scenario.drafting.searching import CannotReach
+from sphshell_pin.scenario.drafting.searching import CannotReach, NewScenario
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
 from tests import urdf
@@ -339,3 +344,110 @@ def test_a_leg_that_starts_at_a_limit_of_its_knee_bends_it(draft, tmp_path: Path
     made = draft(urdf.write(tmp_path / "leg.urdf", parts), "plane")
     _, knee = made.built.q0
     assert 0.6 < knee < 2.4
+
+
+def leg(lower: float, upper: float) -> str:
+    """A leg that turns about z and swings down at its knee, within limits; a ball at its end."""
+    parts = (
+        link("body", ".1 .1 .1") + link("hip") + link("shank", "", "0 0 0", ball(".08", ".5 0 0"))
+    )
+    knee = joint("knee", "hip", "shank", "revolute", "0.2 0 0", "0 1 0")
+    limits = f'lower="{lower}" upper="{upper}"'
+    parts += knee.replace('lower="-1" upper="1"', limits)
+    return parts + joint("turn", "body", "hip", "revolute", "0 0 0", "0 0 1")
+
+
+def settled(made: NewScenario) -> float:
+    """Return the normal force at the end, as a part of the one asked for."""
+    result, _ = simulate(made.built)
+    log = result.contacts
+    last = log.normal_force[log.row == len(result.t) - 1]
+    return float(last.sum() / made.built.scenario.controller.normal_force)
+
+
+def test_a_tip_that_moves_aside_as_it_presses_presses_as_asked(draft, tmp_path: Path) -> None:
+    """Steeply down, the knee moves the foot aside more than down: its spring pulls it back."""
+    made = draft(urdf.write(tmp_path / "leg.urdf", leg(0.52, 1.22)), "plane", place="below")
+    assert settled(made) == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_tip_on_the_axis_of_its_last_joint_presses_along_its_line(draft, tmp_path: Path) -> None:
+    parts = link("palm", ".05 .1 .05") + link("finger") + link("tip", "", "0 0 0", ball(".01"))
+    parts += joint("bend", "palm", "finger", "revolute", "0 0 .1", ".4 .9 .2")
+    parts += joint("turn", "finger", "tip", "revolute", "0 0 .1", "1 0 0")
+    made = draft(urdf.write(tmp_path / "hand.urdf", parts), "box")
+    assert settled(made) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_joint_is_not_pressed_into_its_stop(draft, tmp_path: Path) -> None:
+    parts = link("base", ".05 .05 .05") + link("arm", "", "0 0 0", ball(".02", ".3 0 0"))
+    hinge = joint("hinge", "base", "arm", "revolute", "0 0 .3", "0 1 0")
+    parts += hinge.replace('lower="-1" upper="1"', 'lower="0" upper="0.8"')
+    made = draft(urdf.write(tmp_path / "arm.urdf", parts), "plane", place="above")
+    assert settled(made) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_joint_that_moves_nothing_is_held(draft, tmp_path: Path) -> None:
+    parts = (
+        link("base") + link("arm", ".02 .02 .3", "0 0 .15") + link("fore", ".02 .02 .3", "0 0 .15")
+    )
+    parts += urdf.link("flange") + urdf.link("tool0")
+    parts += joint("a", "base", "arm", *HINGE) + joint(
+        "b", "arm", "fore", "revolute", "0 0 .3", "0 1 0"
+    )
+    parts += joint("c", "fore", "flange", "revolute", "0 0 .3", "0 0 1")
+    parts += joint("d", "flange", "tool0", "fixed", "0 0 .02", "0 0 1")
+    made = draft(urdf.write(tmp_path / "arm.urdf", parts), "plane")
+    assert made.built.scenario.robot[0].lock == ["c"]
+    assert "held, as nothing that they move has a mass: joints 'c'" in made.why
+
+
+def test_a_heavy_slide_presses_with_a_soft_tip(draft, tmp_path: Path) -> None:
+    box = shape("collision", '<box size=".2 .2 .1"/>', "0 0 -.05")
+    parts = urdf.link("rail") + urdf.link("carriage", inertial(150, 1), box)
+    slide = joint("lift", "rail", "carriage", "prismatic", "0 0 .8", "0 0 1")
+    file = urdf.write(tmp_path / "slide.urdf", parts + slide.replace('"50"', '"5000"'))
+    made = draft(file, "plane", material="silicone", radius=0.01)
+    assert settled(made) == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_robot_without_names_stands_on_its_lowest_ends(load) -> None:
+    parts = link("body", ".2 .2 .1") + link("mast", ".02 .02 .3", "0 0 .15")
+    parts += joint("m", "body", "mast", "revolute", "0 0 .05", "0 1 0")
+    for k, (x, y) in enumerate(itertools.product((0.2, -0.2), (0.2, -0.2))):
+        parts += link(f"limb{k}", ".02 .02 .3", "0 0 -.15")
+        parts += joint(f"j{k}", "body", f"limb{k}", "revolute", f"{x} {y} 0", "0 1 0")
+    tips = tips_of(load(parts, free_flyer=True))
+    assert [tip.frame for tip in tips] == [f"limb{k}" for k in range(4)]
+
+
+def test_a_heavy_body_with_one_caster_floats(load) -> None:
+    body = link("body", ".4 .4 .1").replace('mass value="1"', 'mass value="50"')
+    parts = body + link("fork") + link("wheel", ".1 .02 .1")
+    parts += joint("swivel", "body", "fork", "continuous", "0 0 -.1", "0 0 1")
+    parts += joint("roll", "fork", "wheel", "continuous", "0 0 0", "0 1 0")
+    assert only_turns(load(parts).model)
+    assert not only_turns(load(parts.replace("50", "5")).model)
+
+
+def test_of_the_spheres_of_a_finger_the_outermost_is_its_tip(load) -> None:
+    spheres = ball(".01", "0 0 .02"), ball(".01", "0 0 .09"), ball(".01", "0 0 .05")
+    parts = link("palm") + link("finger", "", "0 0 0", *spheres)
+    (tip,) = tips_of(load(parts + joint("j", "palm", "finger", *HINGE)))
+    assert tip.offset[2] == pytest.approx(0.09)
+
+
+def test_couplings_that_no_model_has_leave_their_joints_free(draft, tmp_path: Path) -> None:
+    file = tmp_path / "jaws.xml"
+    file.write_text(
+        """<mujoco><worldbody><body name="arm"><joint name="a" axis="0 1 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/>
+        <body name="hand" pos="0 0 .3"><joint name="b" axis="0 1 0"/>
+        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/></body></body></worldbody>
+        <tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed>
+        </tendon>
+        <equality><tendon tendon1="t"/></equality></mujoco>"""
+    )
+    made = draft(file, "plane")
+    assert made.why[0].startswith("joints that are coupled move freely (--no-mimic)")
+    assert not made.built.scenario.robot[0].mimic

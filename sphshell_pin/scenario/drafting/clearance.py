@@ -133,7 +133,7 @@ class Links:
 
     def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
         """Whether a point of a geometry is behind the surface, where that is closed."""
-        if not self.shell.is_closed:
+        if not self.shell.is_closed or self.shell.side == "inside":
             return False
         mesh = isinstance(one.geometry, coal.BVHModelBase)
         point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
@@ -144,10 +144,15 @@ class Links:
 
 
 def _tree(shell: Shell) -> coal.BVHModelOBBRSS:
+    """Return the triangles that links may not touch: of a hollow its lower half, as a bowl's."""
+    triangles = shell.triangles
+    if shell.side == "inside":
+        heights = shell.vertices[triangles][..., 2].max(axis=1)
+        triangles = triangles[heights <= shell.box[:, 2].mean() + 1e-9 * shell.size]
     tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(shell.triangles), len(shell.vertices))
+    tree.beginModel(len(triangles), len(shell.vertices))
     tree.addVertices(shell.vertices)
-    tree.addTriangles(shell.triangles.astype(np.uint32))
+    tree.addTriangles(triangles.astype(np.uint32))
     tree.endModel()
     return tree
 

@@ -10,7 +10,8 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.limb_ends import COVERS, ON_END, Tip, joint_of
+from sphshell_pin.robots import joints_without_mass
+from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, NewScenario, Search
@@ -43,7 +44,7 @@ class DropSearch(Search):
                 "a robot that floats comes down on the surface by its weight: leave out --press, "
                 f"--place, --at and --path{hold}"
             )
-        lock = tuple[str, ...]()
+        lock = tuple(joints_without_mass(model, self.q0))
         if joint_of(model, self.tips[0].frame) == 1:
             lock = joints_aside(model, self.tips[:1])
             plan = self._fall()
@@ -72,9 +73,8 @@ class DropSearch(Search):
         """Plan a run in which a free body falls on the surface, which is placed as in its file."""
         (tip, *_), shell = self.tips, self.shell
         # A robot is heavier than the ball that it got.
-        given = COVERS in tip.source or ON_END in tip.source
-        gap = (_FOOT_GAP if given else _FALL_GAP) * tip.radius
-        load = given * float(pin.computeTotalMass(self.model))
+        gap = (_FOOT_GAP if tip.end else _FALL_GAP) * tip.radius
+        load = float(pin.computeTotalMass(self.model)) if tip.end else 0.0
         # Beside the middle: a ball in a bowl rolls then.
         beside = _BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
         touch = find_touch_point(

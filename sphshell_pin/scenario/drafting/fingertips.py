@@ -12,7 +12,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact import Sphere
 from sphshell_pin.dynamics.scene.mimic import group_of
-from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint
+from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint, model_reach
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
 from sphshell_pin.scenario.drafting.limb_ends import (
@@ -24,10 +24,15 @@ from sphshell_pin.scenario.drafting.limb_ends import (
 )
 
 _ASKED, _OF_GEOMETRY = "as it was asked for", "the sphere of its collision geometry"
+_LOWEST, _AS_LOW = "one of its lowest ends", 0.1
+"""Ends on which a robot stands, where no name says which: by height, as a part of its reach."""
 # Beginnings of words in the names of frames that mark a tool, in the order of trust; of frames at
 # the end of a limb.
 _TOOL_WORDS = ("tcp", "tool", "ee", "eef", "effector", "grasp", "grip", "flange")
-_END_WORDS = ("tip", "tcp", "tool", "foot", "feet", "ankle")
+# How many times as heavy as its only limb a body is that carries a wheel, and is no foot of an arm.
+_MUCH = 10.0
+_FOOT_WORDS = ("foot", "feet", "ankle")
+_END_WORDS = ("tip", "tcp", "tool", *_FOOT_WORDS)
 
 
 def find_tips(
@@ -63,7 +68,9 @@ def find_tips(
         find_frame(robot.model, frame)
         known = [one for one in known if one.frame == frame]
     elif not floats(robot.model):
-        known = [one for one in known if joint_of(robot.model, one.frame) in limbs][:1]
+        known = _outermost(
+            [one for one in known if joint_of(robot.model, one.frame) in limbs], robot
+        )
     if known and offset is not None:
         known = [replace(known[0], offset=offset, source=_ASKED)]
     # A smaller sphere than that of the collision geometry would be inside it.
@@ -73,6 +80,7 @@ def find_tips(
     if not known:
         names = _ends(robot.model, held, limbs) if frame is None else [(frame, _ASKED)]
         known = [_at_end(robot, *one, radius, offset, asked=frame is not None) for one in names]
+        known = _lowest(robot, known) if names[0][1] == _LOWEST else known
     found = [_sized(one, radius) for one in known]
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
     for one in found if shipped is None or offset is not None else ():
@@ -97,14 +105,16 @@ def other_ends(model: pin.Model, frame: str) -> list[str]:
 def only_turns(model: pin.Model) -> bool:
     """Whether what its body carries only turns, without end: rotors or wheels, and what tilts them.
 
-    Several limbs of at most two joints, all without limits, and lighter than the body.
+    Limbs of at most two joints, the last without limits, and lighter than the body; a single one
+    much.
     """
     first = 2 if floats(model) else 1
-    depths = [len(model.supports[j]) - first for j in _leaves(model)]
-    endless = all("RUB" in one.shortname() for one in list(model.joints)[first:])
+    leaves = _leaves(model) - {first - 1}
+    depths = [len(model.supports[j]) - first for j in leaves]
+    endless = all("RUB" in model.joints[j].shortname() for j in leaves)
     carried = sum(one.mass for one in list(model.inertias)[first:])
-    heavy = model.inertias[first - 1].mass > carried
-    return endless and heavy and len(depths) > 1 and max(depths) <= 2
+    heavy = model.inertias[first - 1].mass > carried * (1 if len(depths) > 1 else _MUCH)
+    return endless and heavy and max(depths, default=3) <= 2
 
 
 def every_finger(robot: LoadedRobot) -> list[Tip]:
@@ -165,6 +175,27 @@ def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
             f"the end of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius "
             f"{end.radius:g}"
         )
+
+
+def _outermost(tips: Sequence[Tip], robot: LoadedRobot) -> list[Tip]:
+    """Return that of the `tips` beside the first one which is farthest from their joint."""
+    frames = [robot.model.frames[find_frame(robot.model, tip.frame)] for tip in tips]
+    away = [
+        float(np.linalg.norm(frame.placement.act(tip.offset)))
+        if frame.parentJoint == frames[0].parentJoint
+        else -1.0
+        for tip, frame in zip(tips, frames, strict=True)
+    ]
+    return [tips[int(np.argmax(away))]] if tips else []
+
+
+def _lowest(robot: LoadedRobot, tips: Sequence[Tip]) -> list[Tip]:
+    """Return those of the `tips` that are as low as the lowest one."""
+    model, data = robot.model, robot.model.createData()
+    pin.framesForwardKinematics(model, data, robot.q0)
+    heights = [data.oMf[find_frame(model, t.frame)].act(t.offset)[2] - t.radius for t in tips]
+    most = min(heights) + _AS_LOW * model_reach(model)
+    return [tip for tip, height in zip(tips, heights, strict=True) if height <= most]
 
 
 def _carried(spheres: Sequence[Sphere], source: str) -> list[Tip]:
@@ -247,7 +278,7 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
         return [(frame_on_joint(model, joint) or model.names[joint], "what carries the gripper")]
     if len(names) == 1 or (names and model.njoints == 2):
         return [(names[0], "the only end of the robot" if len(names) == 1 else "its only body")]
-    for word in _END_WORDS:
+    for word in _FOOT_WORDS if free else _END_WORDS:
         found = [name for name in names if word in name.lower()]
         if len(found) > 1 and not free:
             return [(_freest(model, found), f"the freest of {len(found)} ends called '{word}'")]
@@ -256,6 +287,8 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     last = max(sorted(leaves), key=lambda j: len(model.supports[j]))
     if names and {model.names[j] for j in leaves} <= set(group_of(model, model.names[last])):
         return [(names[0], f"one of {len(leaves)} ends that move together")]
+    if free and len(names) > 1:
+        return [(name, _LOWEST) for name in names]
     if free or len(model.supports[last]) <= 2:
         raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -19,11 +20,11 @@ from sphshell_pin.shell.shell import Shell
 # How far a ball that covers an end may stand out before it, as a part of its radius: else the end
 # is flat, and gets a ball of this part of that radius. Without geometry: as a part of the reach.
 _STANDS_OUT, _BALL, _OF_REACH = 0.25, 1 / 3, 0.01
+# Least radius of a ball on the underside of a body that floats, as a part of its size.
+_OF_BODY = 0.05
 # Points of the tip's own link: what is nearer to the sphere's center, in radii, is the sphere's
 # place, as meshes of fingertips stand out of the spheres that stand for them.
 AT_TIP = 1.5
-COVERS, ON_END = "it covers the end of link", "a ball on the end of link"
-"""How the source of a ball begins: one that is as large as a round end, and one on a flat end."""
 # Steps of the search for the ball that covers an end, and of that for the smallest ball.
 _DEPTHS, _STEPS = 40, 300
 # Motion of a frame per joint's [m/rad] that is none.
@@ -42,6 +43,8 @@ class Tip:
     source: str
     ahead: Array | None = None
     """Out of a flat end (3,), against which a smaller one is drawn back; None: it has one size."""
+    end: Literal["", "round", "flat"] = ""
+    """The end of the link that the ball was made for: it covers a round one, is on a flat one."""
 
     def at_most(self, radius: float) -> "Tip":
         """Return it with a `radius` [m] that is no larger, where its size is free."""
@@ -136,10 +139,13 @@ class LinkGeometry:
         before = float(along.max() - center @ ahead)
         # Open jaws may lie in a ball, but are no round end.
         if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
-            return Tip(name, rounded(covers), center, f"{COVERS} '{self.link}'")
-        ball = rounded(_BALL * covers) if radius is None else radius
+            covering = f"it covers the end of link '{self.link}'"
+            return Tip(name, rounded(covers), center, covering, end="round")
+        floats = self._model.joints[self._joint].nv == 6
+        least = _OF_BODY * size if floats else 0.0
+        ball = rounded(max(_BALL * covers, least)) if radius is None else radius
         front, still = center + (before + ball) * ahead, ahead if radius is None else None
-        return Tip(name, ball, front, f"{ON_END} '{self.link}'", still)
+        return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, "flat")
 
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.

@@ -17,13 +17,13 @@ from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.regular_file import why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
-from sphshell_pin.robots import floats, is_path
-from sphshell_pin.robots.inertia import lacks_masses
+from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
+from sphshell_pin.robots.inertia import few, lacks_masses, lacks_moments
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
 from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import HoldSearch, TooHeavy, every_tip
-from sphshell_pin.scenario.drafting.limb_ends import COVERS, LinkGeometry, Tip
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip
 from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
@@ -65,28 +65,39 @@ def new_scenario(
         draft works: the text says what fails in it and what to change.
     """
     asked = Asked(robot, surface, **options)
+
+    def instead(note: str, **changes: Any) -> NewScenario:
+        made = _written(replace(asked, **changes))
+        return replace(made, why=(note, *made.why))
+
     try:
         return _written(asked)
     except CannotReach as error:
         said = str(error).partition(";")[0]
         for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
             with suppress(SphshellError):
-                made = _written(replace(asked, frame=other))
-                note = f"frame '{other}', as with '{error.frame}' {said}"
-                return replace(made, why=(note, *made.why))
+                return instead(f"frame '{other}', as with '{error.frame}' {said}", frame=other)
         raise
     except TooHeavy as error:
         if asked.against is not None:
             raise
-        made = _written(replace(asked, against="plastic"))
-        note = f"the part is of plastic, as with steel {str(error).partition(';')[0]}"
-        return replace(made, why=(note, *made.why))
+        said = str(error).partition(";")[0]
+        return instead(f"the part is of plastic, as with steel {said}", against="plastic")
+    except RobotError as error:
+        if not asked.mimic:
+            raise
+        said = str(error).partition(";")[0]
+        try:
+            return instead(
+                f"joints that are coupled move freely (--no-mimic), as else: {said}", mimic=False
+            )
+        except RobotError:
+            raise error from None
     except CannotStand as error:
         if asked.base is not None:
             raise
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-    fixed = _written(replace(asked, base="fixed"))
-    return replace(fixed, why=(note, *fixed.why))
+    return instead(note, base="fixed")
 
 
 def _written(asked: Asked) -> NewScenario:
@@ -126,7 +137,9 @@ def _written(asked: Asked) -> NewScenario:
     masses = loaded.assumed
     if masses and asked.density is None:
         masses += ": another with --density"
-    why = tuple(one for one in (shape, *made.why, masses) if one)
+    idle = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
+    idle = idle and f"held, as nothing that they move has a mass: joints {idle}"
+    why = tuple(one for one in (shape, *made.why, masses, idle) if one)
     return replace(made, why=why)
 
 
@@ -142,7 +155,11 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     if (base := shaped or asked.base) != section.base:
         changed["base"] = base
     states = section.name is not None or asked.density is not None
-    if not states and lacks_masses(loaded.model, loaded.description, floating=base == "floating"):
+    floating = base == "floating"
+    lacks = lacks_moments(loaded.description) or lacks_masses(
+        loaded.model, loaded.description, floating=floating
+    )
+    if not states and lacks:
         changed["density"] = _DENSITY
     if changed:
         section = section.model_copy(update=changed)
@@ -166,7 +183,7 @@ def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
     sized = list[Tip]()
     for tip in tips:
         large = tip.radius > made.size
-        if most and large and COVERS in tip.source:
+        if most and large and tip.end == "round":
             sized.append(LinkGeometry(built.assembly.loaded[0], tip.frame).end(most))
         else:
             sized.append(tip.at_most(most) if most and (large or not floating) else tip)

@@ -117,13 +117,17 @@ class Bench:
                         self._shell, spot, spot.point[None], self._limb.tip.radius, self._depth
                     )
                 )
-                z = height(spot)
+                # What moves along one line alone presses along the normal there.
+                line = posture.slide is None
+                z = None if line else height(spot)
                 at = posture.center if z is None else np.array([*posture.center[:2], z])
                 stance = posture.at(at)
                 if stance is None or (not on_face and uneven):
                     continue
+                front = spot.normal if line else side
+                turn = turned_to(front, -stance.approach) if line else facing
                 for angle in _YAWS:
-                    turned = pin.AngleAxis(angle, approach).toRotationMatrix() @ facing
+                    turned = pin.AngleAxis(angle, stance.approach).toRotationMatrix() @ turn
                     placement = pin.SE3(turned, stance.center - turned @ spot.center)
                     self.tried += 1
                     # With a little room, as the tip yields when it is pressed on and slides.
@@ -134,7 +138,7 @@ class Bench:
                         continue
                     bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
                     raised = bottom + float(placement.translation[2]) - self._links.floor
-                    place = Place(stance, spot, placement, on_face, raised, side)
+                    place = Place(stance, spot, placement, on_face, raised, front)
                     if on_face:
                         yield place
                         offered += 1

@@ -53,7 +53,8 @@ class Press:
     The sphere begins with the `gap` [m] at the first point of the way and presses with `force` [N],
     from `lead_in` [s] on while it slides. The efforts of motors that are too `weak` are not
     modeled. A `calm` one has more damping, and joints that nothing pulls to a posture. `repair` is
-    what was changed of a draft that failed; "" of the first draft.
+    what was changed of a draft that failed; "" of the first draft. The surface is `hollow` if it is
+    touched from inside.
 
     Attributes
     ----------
@@ -76,10 +77,14 @@ class Press:
     lead_in: float = 0.0
     calm: bool = False
     repair: Literal["", "calmed", "cut", "stays"] = ""
+    hollow: bool = False
 
     def __post_init__(self) -> None:
-        stance, force, self.path = self.place.stance, self.force, self.way.points
-        radius, self.slides = stance.tip.radius, self.way.slides
+        stance, force, self.slides = self.place.stance, self.force, self.way.slides
+        radius = stance.tip.radius
+        # As it comes into the part, its spring shall not pull it back to where it was before.
+        beside = (self.gap + self.materials.depth(force, radius)) * stance.aside
+        self.path = self.way.points + self.place.placement.rotation.T @ beside
         rise = force_rise(radius, force, stance.mass, self.materials)
         self.force_rise = max(0.5 * self.lead_in, rise)
         self.lead_in = 2 * self.force_rise
@@ -90,10 +95,14 @@ class Press:
         # Over the gap the mass is moved by 3 force (t / rise)^2, the beginning of the rise: the gap
         # is force t^4 / (4 mass rise^2), the speed four times that by t.
         self.first_touch = (4 * stance.mass * self.force_rise**2 * self.gap / force) ** 0.25
-        self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, 0.1 * self.speed)
+        # What slides as it comes to rest does so at once, where nothing makes it slide later.
+        slip = self.speed * (1.0 if stance.slide is None else 0.1)
+        self.contact = Contact(self.materials, 4 * self.gap / self.first_touch, slip)
         self.damped = DAMPED * (CALM if self.calm else 1.0)
         friction = self.contact.mu_static * force
-        stiffness = max(stance.slide_mass * TIP_RATE**2, friction / (TIP_LAG * radius))
+        # What cannot slide follows no path: its mass would be damped more than the contact bears.
+        follows = 0.0 if stance.slide is None else stance.slide_mass * TIP_RATE**2
+        stiffness = max(follows, friction / (TIP_LAG * radius))
         mass = math.sqrt(stance.mass * stance.slide_mass)
         turning = 0.0
         if stance.inertia:
@@ -122,6 +131,8 @@ class Press:
             f"normal force {self.force:g} N, for an effective mass of {stance.mass:.3g} kg at the "
             "tip",
             self.weak and WEAK,
+            self.hollow
+            and "the limb comes in through the upper half of the bowl, which is open to it",
             not way.even and "the force on the surface is the resultant of several",
             f"the tip slides over {mm(way.length)}{farther}"
             if self.slides

@@ -46,7 +46,6 @@ _ADVICE = {
     "links": "take another --place, a smaller part, or a sphere farther out (--frame, --offset)",
     "figure": "take another --law or --radius",
 }
-_ADVICE_BOWL = "the bowl is a whole ball, which the limb would pass: take the file of an open one"
 
 
 def repaired(one: Press, fault: Fault) -> Press | None:
@@ -56,11 +55,13 @@ def repaired(one: Press, fault: Fault) -> Press | None:
     if fault.kind == "force" and not one.repair:
         return replace(one, calm=True, repair="calmed")
     # Up to where it failed the path will do.
-    along = np.cumsum([0.0, *np.linalg.norm(np.diff(one.path, axis=0), axis=1)])
+    along = np.cumsum([0.0, *np.linalg.norm(np.diff(one.way.points, axis=0), axis=1)])
     count = int((along < _CUT * one.speed * (fault.t - one.lead_in)).sum())
     if along[max(count - 1, 0)] < SHORTEST_PATH * one.place.stance.tip.radius:
         return None
-    return replace(one, way=replace(one.way, points=one.path[:count], why=fault.text), repair="cut")
+    return replace(
+        one, way=replace(one.way, points=one.way.points[:count], why=fault.text), repair="cut"
+    )
 
 
 def _still(one: Press, fault: Fault) -> list[Press]:
@@ -71,7 +72,7 @@ def _still(one: Press, fault: Fault) -> list[Press]:
     if fault.kind == "links" and fault.t < one.lead_in:
         return []
     why = f"with a path {fault.text}" if one.slides else one.way.why
-    way = replace(one.way, points=one.path[:1], why=why)
+    way = replace(one.way, points=one.way.points[:1], why=why)
     return [replace(one, way=way, lead_in=_CALM_LEAD_IN, repair="stays")]
 
 
@@ -139,7 +140,8 @@ class PressSearch(Search):
             gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.held, radius, gap, self.room)
-            yield Press(place, way, pair, force, gap, weak=not stance.force)
+            hollow = asked.inside
+            yield Press(place, way, pair, force, gap, weak=not stance.force, hollow=hollow)
 
     def _places(self) -> Iterator[Place]:
         """Yield places of the part before the tip, those on the floor of the robot's base first.
@@ -211,7 +213,7 @@ class PressSearch(Search):
         return CannotReach(
             f"link '{link}' would be in the part, or another one: in each of "
             f"{counted(bench.postures, 'posture')} and {counted(bench.tried, 'place')} on the part "
-            f"that were tried; {_ADVICE_BOWL if self.asked.inside else _ADVICE['links']}",
+            f"that were tried; {_ADVICE['links']}",
             frame,
             other_ends(self.model, frame),
         )

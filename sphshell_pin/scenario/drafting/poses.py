@@ -10,19 +10,23 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.robots import joints_without_mass
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 
 # Mobility along the approach and across it, as a part of the best one: below the first a posture is
 # singular; the posture that a robot is known to work in is taken from the second on.
-# A heavy arm with a light wrist has 0.01 in its best posture. The last is that of a tip with one
-# coordinate, whose friction bears part of the force otherwise.
-_MOBILE, _EASY, _STRAIGHT = 2e-3, 0.1, 0.998
+# A heavy arm with a light wrist has 0.01 in its best posture.
+_MOBILE, _EASY = 2e-3, 0.1
 # Postures: seeds tried, how far from each other [rad or m] they have to be, and how many are taken.
 _SEEDS, _APART, _MOST = 32, 0.3, 4
+# Postures in which the tip's motion is looked at, whether it is along one line.
+_LOOKED = 3
 # Cosine between limb and approach below which the limb is beside the tip or before it.
 _BESIDE = 0.3
+# How far between its motion and its limb a tip may press that moves along a line.
+_BETWEEN = (0.0, 1.0, 2.0)
 NO_LIMIT = 1e9
 """Efforts [N m] and forces [N] beyond this stand for none."""
 # Distance of a joint at ease from its nearer limit, as a part of its range.
@@ -34,10 +38,14 @@ _HEIGHT, _ASTRAY, _TURNED, _FASTEST = 1e-4, 0.1, 0.02, 6.0
 
 
 def joints_aside(model: pin.Model, tips: Sequence[Tip]) -> tuple[str, ...]:
-    """Return the joints that move none of the `tips`."""
+    """Return the joints that move none of the `tips`, and those that move no mass.
+
+    If none of them moved a mass, they would be held without one that could move: none is.
+    """
     # A joint that is held holds those that mimic it, and what it mimics.
     chains = [list(model.supports[joint_of(model, tip.frame)])[1:] for tip in tips]
     on_way = {model.names[j] for chain in chains for j in chain}
+    on_way = on_way.difference(joints_without_mass(model, pin.neutral(model))) or on_way
     moving = {one for name in on_way for one in group_of(model, name)}
     return tuple(name for name in list(model.names)[1:] if name not in moving)
 
@@ -49,18 +57,18 @@ class Limb(Reach):
         self.tip, self.lock = tip, joints_aside(model, [tip])
         super().__init__(model, tip.frame, tip.offset, self.lock)
         self.chain = list(model.supports[model.frames[self.frame].parentJoint])[1:]
+        rng, neutral = np.random.default_rng(0), pin.neutral(model)
+        moves = [self.jacobian(self.seed(neutral, rng))[:3] for _ in range(_LOOKED)]
+        self.on_line = max(_rank(one) for one in moves) == 1
+        """Whether all joints move the tip along one line, in any posture."""
 
     def direction(self) -> Array:
         """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
 
         To a sphere before its frame as the frame points, else the frame would be dragged beside it;
-        to any other along the line from the last joint that is not inside it. Of a tip with a
-        single coordinate it is the direction of its motion: pressed along another one it jams by
-        friction.
+        to any other along the line from the last joint that is not inside it.
         """
-        pose, motion = self.data.oMf[self.frame], self.moves
-        if motion.shape[1] == 1 and motion.any():
-            return unit(motion[:, 0])
+        pose = self.data.oMf[self.frame]
         # A small ball on a flat end may be far beside the frame.
         way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
         if way.any():
@@ -70,6 +78,19 @@ class Limb(Reach):
             if np.linalg.norm(away) > self.tip.radius:
                 return unit(away)
         return np.array([0.0, 0.0, -1.0])
+
+    def pushes(self, approach: Array) -> list[Array]:
+        """Return where the tip presses near an `approach` (3,), in the posture asked for last.
+
+        One that moves along a line presses along it, or between it and the limb: a fingertip.
+        """
+        if not self.on_line:
+            return [approach]
+        line = unit(self.moves[:3][:, np.argmax(np.abs(self.moves[:3]).max(axis=0))])
+        line = line if line @ approach >= 0 else -line
+        forward = self.direction()
+        aside = unit(forward - line * (line @ forward))
+        return [unit(line + k * aside) for k in _BETWEEN if line @ approach > _BESIDE]
 
 
 class Stance:
@@ -85,6 +106,8 @@ class Stance:
         Center of the tip's sphere (3,) [m].
     approach
         Unit (3,): where the tip presses.
+    aside
+        Motion (3,) across the approach that comes with one along it: 0 of a tip that moves freely.
     slide
         Unit (3,) across the approach: where the tip moves best; None where it cannot.
     mass, slide_mass
@@ -107,6 +130,7 @@ class Stance:
         The least motion that joints make, turns of the tip included, as a part of the largest.
     ahead
         Cosine between the approach and the limb that carries the tip; below 0 it is in the way.
+        1 of a tip that moves along one line, unless its limb is behind that.
     """
 
     def __init__(self, limb: Limb, q: Array, approach: Array) -> None:
@@ -120,7 +144,11 @@ class Stance:
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
         ahead = float(limb.direction() @ approach)
-        self.ahead = ahead if len(columns) > 1 else abs(ahead)
+        self.ahead = 1.0 if limb.on_line and ahead > -0.5 else ahead
+        # Where joints can move the tip, as near as they can along the approach.
+        ways = np.linalg.svd(linear, full_matrices=False)[0][:, : _rank(linear)]
+        near = ways @ (ways.T @ approach)
+        self.aside = near / max(float(near @ approach), 1e-3) - approach
         mass = mass_matrix(model, q)[np.ix_(columns, columns)]
         self.joint_inertia = np.diag(mass).copy()
         response = np.linalg.solve(mass, jacobian.T)
@@ -130,15 +158,15 @@ class Stance:
         across = np.eye(3) - np.outer(approach, approach)
         sideways, slides = np.linalg.eigh(across @ mobility @ across)
         easiest = float(sideways[-1])
-        self.slide = _upright(slides[:, -1]) if easiest > _MOBILE * top else None
+        slides_there = not limb.on_line and easiest > _MOBILE * top
+        self.slide = _upright(slides[:, -1]) if slides_there else None
         self.mass = 1 / max(along, 1e-9)
         self.slide_mass = self.mass if self.slide is None else 1 / max(easiest, 1e-9)
         # Where the tip can slide, both ways count: a stretched arm slides sideways at best.
-        self.mobility = (min(along, easiest) if len(columns) > 1 else along) / top
+        self.mobility = (along if limb.on_line else min(along, easiest)) / top
         turning = float(np.trace(angular @ response[:, 3:]))
         turns = int(np.linalg.matrix_rank(angular, tol=1e-6))
-        spare = len(columns) - int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max()))
-        self.inertia = turns / turning if spare and turning > 1e-9 else 0.0
+        self.inertia = turns / turning if len(columns) > _rank(linear) and turning > 1e-9 else 0.0
         efforts, dry = model.upperEffortLimit[columns], model.upperDryFrictionLimit[columns]
         stated = (efforts < NO_LIMIT) & (efforts > 0)
         # Motors bear the friction of their joints, too, and the weight of the links.
@@ -168,6 +196,17 @@ class Stance:
         q, off = self.limb.solve(self.q, center, turn=held if self.joints >= 6 else None)
         found = Stance(self.limb, q, self.approach)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
+
+    def can_yield(self) -> bool:
+        """Whether the tip can come into a part by a tenth of its radius within the joints' limits.
+
+        At a limit the stop would bear the force, and not the part.
+        """
+        limb, step = self.limb, np.zeros(self.limb.model.nv)
+        inverse = np.linalg.pinv(limb.jacobian(self.q)[:3], rcond=_MOBILE)
+        step[limb.columns] = inverse @ (0.1 * self.tip.radius * self.approach)
+        pressed = pin.integrate(limb.model, self.q, step)
+        return bool(np.abs(limb.into_limits(pressed) - pressed).max() < 1e-9)
 
     def follows(self, centers: Array, free: Callable[[Array], bool]) -> tuple[int, str]:
         """Return how many of the `centers` (k, 3) the tip reaches one after the other, and why.
@@ -201,18 +240,11 @@ def approaches(limb: Limb, q: Array, directions: Sequence[Sequence[float]]) -> l
     """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
 
     After the first one, the axis of the world along which the limb that carries the tip points at
-    q. A tip of a single coordinate presses in the plane of its motion alone.
+    q.
     """
-    axis, way = limb.jacobian(q)[3:], limb.direction()
-    home = tuple(nearest_axis(way))
-    found = [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
-    if axis.shape[1] > 1:
-        return found
-    if not axis.any():
-        return [way, -way]
-    normal = unit(axis[:, 0])
-    flat = [one - normal * (normal @ one) for one in found]
-    return [unit(one) for one in flat if np.linalg.norm(one) > 0.5]
+    limb.jacobian(q)
+    home = tuple(nearest_axis(limb.direction()))
+    return [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
 
 
 def stances(
@@ -230,29 +262,26 @@ def stances(
     place = np.array([0.0, 0.0, height or 0.0])
 
     def along() -> Array:
-        way = limb.direction()
-        if len(limb.columns) == 1 and way @ approach < 0:
-            way = -way
-        return turn_between(way, approach)
+        return turn_between(limb.direction(), approach)
 
-    least = _MOBILE if len(limb.columns) > 1 else _STRAIGHT
     found: list[tuple[float, Stance]] = []
     start = limb.into_limits(q)
     for k in range(_SEEDS):
         seed = limb.seed(start, rng) if k else start
-        at, off = limb.solve(seed, place, rows=rows, turn=along)
-        one = Stance(limb, at, approach)
-        if off > _HEIGHT * one.reach or one.mobility < least or one.ahead <= _BESIDE:
-            continue
+        at, off = limb.solve(seed, place, rows=rows, turn=None if limb.on_line else along)
         away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
-        if min(away, default=np.inf) < _APART or not usable(at):
-            continue
-        ease = _ease(limb, at)
-        rank = one.mobility * one.ahead * ease * one.dexterity
-        rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
-        found.append((rank * (one.force > 0), one))
+        limb.jacobian(at)
+        for one in [Stance(limb, at, way) for way in limb.pushes(approach)]:
+            if off > _HEIGHT * one.reach or one.mobility < _MOBILE or one.ahead <= _BESIDE:
+                continue
+            if min(away, default=np.inf) < _APART or not (one.can_yield() and usable(at)):
+                continue
+            ease = _ease(limb, at)
+            rank = one.mobility * one.ahead * ease * one.dexterity
+            rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
+            found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
-    return [one for _, one in found[:_MOST]]
+    return [one for _, one in found[: _MOST * (len(_BETWEEN) if limb.on_line else 1)]]
 
 
 def _ease(limb: Limb, q: Array) -> float:
@@ -260,6 +289,11 @@ def _ease(limb: Limb, q: Array) -> float:
     at = q[limb.bounded]
     room = np.minimum(at - limb.low, limb.high - at) / (limb.high - limb.low)
     return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
+
+
+def _rank(linear: Array) -> int:
+    """Return in how many directions joints move the tip, by its Jacobian (3, k)."""
+    return int(np.linalg.matrix_rank(linear, tol=1e-3 * np.abs(linear).max(initial=1e-9)))
 
 
 def _upright(axis: Array) -> Array:

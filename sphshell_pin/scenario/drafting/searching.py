@@ -111,8 +111,11 @@ class Search(ABC):
         scenario = parse_scenario(text, self.file)
         check_knobs(scenario, self.file, ranges=True)
         known = plan.part.beside(self.built, self.file.stem) if plan.part else self.built
-        built = build_scenario(scenario, self.file, known)
-        fault = try_out(built, plan, links)
+        try:
+            built = build_scenario(scenario, self.file, known)
+            fault = try_out(built, plan, links)
+        except SphshellError as error:
+            fault = Fault("run", str(error))
         if fault is None:
             why, part = (*plan.why, plan.contact.note), plan.part.urdf() if plan.part else ""
             return NewScenario(self.file, text, built, explain_built(built), why, part)
