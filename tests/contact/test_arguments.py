@@ -87,7 +87,6 @@ REFUSED: list[tuple[str, Call]] = [
     ("force", lambda: sp.TableLaw([0, 1], [0, None])),
     *(("depth", lambda depth=depth: sp.TableLaw(depth, [0, 1])) for depth in ("01", [[0, 1]], 1.0)),
     ("function = 3.0 must be a C function pointer", lambda: sp.FunctionLaw(3.0)),
-    ("function = 0 must not be null", lambda: sp.FunctionLaw(0)),
     ("function = .* must not be null", lambda: sp.FunctionLaw(FORCE())),
     (r"be a double f\(double, double, const double\*", lambda: sp.FunctionLaw(OTHER(abs))),
     (r"energy = .* double f\(double, const", lambda: sp.FunctionLaw(POINTER, FORCE(force))),

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.cli.export import nanoseconds
 from sphshell_pin.errors import DataError, InvalidParameter, InvalidShell, ResultError
 from sphshell_pin.patches import ShellTaxels
 from sphshell_pin.study.fit import Experiment
@@ -37,7 +36,6 @@ def test_arguments_are_named(tmp_path) -> None:
         "kind = .* must be a name": lambda: result.plot(NAMES),
         "pair = .* must be a name": lambda: ShellTaxels(NAMES),
         "q = .* must hold 7 numbers": lambda: scene.contacts(np.ma.masked_equal(Q, 0.0)),
-        "--start = .* must be seconds": lambda: nanoseconds("1e999999999"),
     }.items():
         with pytest.raises(InvalidParameter, match=said):
             use()
@@ -50,16 +48,16 @@ def test_arguments_are_named(tmp_path) -> None:
         replace(result, t=np.full_like(result.t, -1e308)).to_mcap(path)
 
 
-def read(force, sigma=None):
-    """Return the data of a force at two times."""
+def read(force, **more):
+    """Return the data of a force at two times; `more` columns by name."""
     known = {"f": Quantity("f", "N", lambda _, t: t)}
-    data = {"t [s]": [0.0, 1.0], "f [N]": force}
-    return read_experiment(Experiment(data), 1, known, 1.0, sigma=sigma)
+    data = {"t [s]": [0.0, 1.0], "f [N]": force} | more
+    return read_experiment(Experiment(data), 1, known, 1.0)
 
 
 def test_data_that_cannot_be_computed_with_are_named() -> None:
     with pytest.raises(DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
         read([1.0, 1e308])
     with pytest.raises(DataError, match=r"'f.sigma' must be positive .*too small to compute with"):
-        read([1.0, 2.0], {"f": 1e-320})
+        read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
     assert read(np.ma.masked_greater([1.0, 2.0], 1.5)).columns[0].values.tolist() == [1.0]
