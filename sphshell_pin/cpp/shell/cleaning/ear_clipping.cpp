@@ -7,19 +7,19 @@
 namespace sphshell {
 namespace {
 
-using Vec2 = PointTree<2>::Point;
+using Point2 = PointTree<2>::Point;
 
 // Twice the signed area of the triangle a, b, c.
-double cross(const Vec2& a, const Vec2& b, const Vec2& c) {
+double cross(const Point2& a, const Point2& b, const Point2& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-double squared(const Vec2& a, const Vec2& b) {
+double squared(const Point2& a, const Point2& b) {
   return (b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]);
 }
 
 // 2 area / longest edge^2, signed: the measure by which elements count as without area.
-double shape(const Vec2& a, const Vec2& b, const Vec2& c) {
+double shape(const Point2& a, const Point2& b, const Point2& c) {
   const double longest = std::max({squared(a, b), squared(b, c), squared(c, a)});
   return longest > 0.0 ? cross(a, b, c) / longest : 0.0;
 }
@@ -218,7 +218,7 @@ class Clipper {
   // inserted ones do) would be left with a sliver: such ears come last.
   double ear_shape(int i) {
     const int h = previous_[i], j = next_[i];
-    const Vec2 &a = flat_[h], &b = flat_[i], &c = flat_[j];
+    const Point2 &a = flat_[h], &b = flat_[i], &c = flat_[j];
     blocker_[i] = -1;
     const double quality = shape(a, b, c);
     if (quality <= kFlat) return kBlocked;
@@ -229,7 +229,7 @@ class Clipper {
     const auto blocks = [&](int k) {
       // The two banks of a bridge to a hole share their vertices: those do not block.
       if (vertex(k) == vertex(h) || vertex(k) == vertex(i) || vertex(k) == vertex(j)) return false;
-      const Vec2& p = flat_[k];
+      const Point2& p = flat_[k];
       if (cross(a, b, p) >= -slack && cross(b, c, p) >= -slack && cross(c, a, p) >= -slack) {
         blocker_[i] = first_copy_[k];
         return true;
@@ -242,10 +242,10 @@ class Clipper {
     if (many_) {
       // A point within the slack is at most 0.5 % of an edge outside: shape > kFlat = 200 * 1e-14.
       const double grow = 0.02 * std::sqrt(slack / 1e-14) + 2.0 * reach;
-      const Vec2 low{std::min({a[0], b[0], c[0]}) - grow, std::min({a[1], b[1], c[1]}) - grow};
-      const Vec2 high{std::max({a[0], b[0], c[0]}) + grow, std::max({a[1], b[1], c[1]}) + grow};
+      const Point2 low{std::min({a[0], b[0], c[0]}) - grow, std::min({a[1], b[1], c[1]}) - grow};
+      const Point2 high{std::max({a[0], b[0], c[0]}) + grow, std::max({a[1], b[1], c[1]}) + grow};
       // Rounding is monotone: the computed product of no point in the box is beyond its extremes.
-      const auto extreme = [](const Vec2& from, const Vec2& to, const PointTree<2>::Box& box,
+      const auto extreme = [](const Point2& from, const Point2& to, const PointTree<2>::Box& box,
                               bool most) {
         return cross(from, to,
                      {(to[1] > from[1]) == most ? box.low[0] : box.high[0],
@@ -313,7 +313,7 @@ class Clipper {
   const Points& points_;
   double tolerance_;
   std::int64_t first_ = 0;
-  std::vector<Vec2> flat_;
+  std::vector<Point2> flat_;
   std::vector<int> next_, previous_;
   std::vector<double> score_;
   std::vector<int> first_copy_;  // of each corner: the first one that is the same vertex
