@@ -451,3 +451,11 @@ def test_couplings_that_no_model_has_leave_their_joints_free(draft, tmp_path: Pa
     made = draft(file, "plane")
     assert made.why[0].startswith("joints that are coupled move freely (--no-mimic)")
     assert not made.built.scenario.robot[0].mimic
+
+
+def test_a_sensor_on_a_joint_without_range_keeps_no_drone_from_floating(load) -> None:
+    parts = link("body", ".4 .4 .1").replace('mass value="1"', 'mass value="50"') + link("imu")
+    still = joint("i", "body", "imu", *HINGE).replace('lower="-1" upper="1"', 'lower="0" upper="0"')
+    for name, x in (("front", 0.2), ("back", -0.2)):
+        parts += link(name) + joint(name + "_j", "body", name, "continuous", f"{x} 0 0", "0 0 1")
+    assert only_turns(load(parts + still).model)

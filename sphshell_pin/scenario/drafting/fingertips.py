@@ -109,7 +109,14 @@ def only_turns(model: pin.Model) -> bool:
     much.
     """
     first = 2 if floats(model) else 1
-    leaves = _leaves(model) - {first - 1}
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    # A range of 0 is that of a sensor, which a simulator keeps by a joint.
+    turns = {
+        j
+        for j in _leaves(model) - {first - 1}
+        if model.joints[j].nq != 1 or low[model.joints[j].idx_q] < high[model.joints[j].idx_q]
+    }
+    leaves = turns or _leaves(model)
     depths = [len(model.supports[j]) - first for j in leaves]
     endless = all("RUB" in model.joints[j].shortname() for j in leaves)
     carried = sum(one.mass for one in list(model.inertias)[first:])
