@@ -148,10 +148,13 @@ bool Recognizer::take(Growth growth) {
   std::vector<int> shared(faces_.size(), 0);
   for (const int t : all)
     if (of_[t] >= 0) ++shared[of_[t]];
-  // A face gives way where nearly all of it is shared, and the new one is clearly larger.
+  growth.explained = double(all.size());
+  // A face gives way where nearly all of it is shared, and the new one explains clearly more: so a
+  // triangle changes hands a few times at most, and no two faces take each other's for ever.
   const auto stays = [&](int f) {
-    const double own = double(faces_[f].triangles.size());
-    return shared[f] < 0.9 * own || double(all.size()) < 1.3 * own;
+    const Growth& face = faces_[f];
+    return shared[f] < 0.9 * double(face.triangles.size()) ||
+           growth.explained < 1.3 * face.explained;
   };
   // Its flats go with it.
   for (std::size_t f = 0; f < shared.size(); ++f)

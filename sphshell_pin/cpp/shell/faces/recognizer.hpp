@@ -62,6 +62,7 @@ struct Growth {
   double window = 0;     // the vertices are as close as that to the shape [m]
   // Triangles that lean or stand off more than the others; regions wider than the regular step.
   std::vector<int> left_out = {}, wide = {};
+  double explained = 0;  // triangles, with those that stay on other faces
 };
 
 enum class Inscribed : char { No, Plane, Belt };
