@@ -459,3 +459,27 @@ def test_a_sensor_on_a_joint_without_range_keeps_no_drone_from_floating(load) ->
     for name, x in (("front", 0.2), ("back", -0.2)):
         parts += link(name) + joint(name + "_j", "body", name, "continuous", f"{x} 0 0", "0 0 1")
     assert only_turns(load(parts + still).model)
+
+
+def test_a_ball_between_walls_is_carried_out_of_them(draft, tmp_path: Path) -> None:
+    """The ball is 100 mm deep between plates, on a joint that moves it by 20 mm."""
+    plates = [
+        shape("collision", '<box size=".12 .01 .2"/>', at) for at in ("0 .06 .1", "0 -.06 .1")
+    ]
+    out = link("base") + link("upper", ".02 .02 .3", "0 0 .15") + link("cup", "", "", *plates)
+    out += joint("a", "base", "upper", "revolute", "0 0 .4", "0 1 0")
+    out += joint("b", "upper", "cup", "revolute", "0 0 .3", "0 1 0")
+    out += link("tip", "", "", ball(".01"))
+    slide = joint("c", "cup", "tip", "prismatic", "0 0 .1", "0 0 1")
+    out += slide.replace('"-1"', '"-.02"').replace('"1"', '".02"')
+    file = urdf.write(tmp_path / "cup.urdf", out)
+    made = draft(file)
+    assert "of its collision geometry, on a stub of 76 mm: else links would be" in made.why[0]
+    (contact,) = made.built.scenario.contact
+    assert np.linalg.norm(contact.sphere.offset) == pytest.approx(0.076, abs=1e-5)
+    result, _ = simulate(made.built)
+    force = made.built.scenario.controller.normal_force
+    log = result.contacts
+    assert log.normal_force[log.t > log.t.max() - 0.2].mean() == pytest.approx(force, rel=0.05)
+    with pytest.raises(CannotReach, match="'cup' would be in the part"):
+        draft(file, frame="tip", radius=0.01)

@@ -73,10 +73,20 @@ def new_scenario(
     try:
         return _written(asked)
     except CannotReach as error:
-        said = str(error).partition(";")[0]
+        said, stated = str(error).partition(";")[0], asked.frame and asked.radius
+        farther = [error.out]
         for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
-            with suppress(SphshellError):
+            try:
                 return instead(f"frame '{other}', as with '{error.frame}' {said}", frame=other)
+            except CannotReach as another:
+                farther.append(another.out)
+            except SphshellError:
+                pass
+        # A sphere of which the place is asked for stays there.
+        for tip in farther if asked.offset is None and not stated else ():
+            with suppress(SphshellError):
+                if tip is not None:
+                    return _written(asked, tip)
         raise
     except TooHeavy as error:
         if asked.against is not None:
@@ -97,17 +107,23 @@ def new_scenario(
         if asked.base is not None:
             raise
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-    return instead(note, base="fixed")
+    made = new_scenario(robot, surface, **{**options, "base": "fixed"})
+    return replace(made, why=(note, *made.why))
 
 
-def _written(asked: Asked) -> NewScenario:
-    """Write the scenario that is asked for; CannotStand as DropSearch raises it."""
+def _written(asked: Asked, tip: Tip | None = None) -> NewScenario:
+    """Write the scenario that is asked for, with this `tip` if it is given.
+
+    CannotStand as DropSearch raises it.
+    """
     file = _free_path(asked)
     section, bare, shaped = _bare(asked, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
-    if in_hand:
+    if tip is not None:
+        tips = [tip]
+    elif in_hand:
         tips = every_tip(loaded, asked)
     else:
         tips = find_tips(
@@ -116,7 +132,7 @@ def _written(asked: Asked) -> NewScenario:
     check_masses(bare.assembly, joints_aside(bare.assembly.model, tips))
     shell = _shell_section(asked, file, bare, tips)
     built = _build_bare(section, file, shell, reuse=bare)
-    tips = _sized_to(built, tips, asked)
+    tips = tips if tip else _sized_to(built, tips, asked)
     built = _sided(built, tips, inside=asked.inside)
     # What is written is what was built, and tried.
     search: type[Search] = DropSearch if floats(built.assembly.model) else PressSearch

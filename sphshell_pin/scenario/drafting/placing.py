@@ -11,10 +11,11 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.clearance import Links
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Limb, Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, turned_to
-from sphshell_pin.scenario.drafting.wording import axis_name
+from sphshell_pin.scenario.drafting.wording import axis_name, mm, rounded
 
 # Turns of the part about the approach, tried in this order [rad].
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
@@ -24,6 +25,9 @@ _STEEP = 0.8
 # Places and turns at which links are held against the part: of one side and height, of these once
 # so many were tried in all, and places of one posture that are offered.
 _MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 16, 1000, 2
+# Lengths of stubs that carry a ball out of its limb, in radii, and at how many of the places that
+# were tried they are looked for.
+_STUBS, _LOOKED = 1.5 ** np.arange(1.0, 13.0), 200
 # How far joints may be under the floor [m]: not at all, but for rounding.
 _AT_FLOOR = 1e-6
 
@@ -84,6 +88,7 @@ class Bench:
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
         # What was come across: postures, places that were tried, and links that were in the part.
         self.postures, self.tried, self.blocked = 0, 0, Counter[str]()
+        self._covered: list[tuple[Stance, pin.SE3]] = []
 
     def places(
         self,
@@ -135,6 +140,7 @@ class Bench:
                     found = self._links.within(stance.q, part, whole=True)
                     if found is not None:
                         self.blocked[found] += 1
+                        self._covered.append((stance, part))
                         continue
                     bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
                     raised = bottom + float(placement.translation[2]) - self._links.floor
@@ -150,6 +156,26 @@ class Bench:
             if self.tried >= most:
                 break
         yield from uneven
+
+    def out_of_limb(self) -> Tip | None:
+        """Return the ball on the shortest stub with which the links would be free of the part.
+
+        None where that would be longer than the limb at each place that was tried.
+        """
+        tip, some = self._limb.tip, self._covered[:: len(self._covered) // _LOOKED + 1]
+        for length in [rounded(one) for one in _STUBS * tip.radius]:
+            for stance, part in some:
+                away = -length * stance.approach
+                if length > stance.reach or self._links.within(
+                    stance.q, nearer(part, away), whole=True
+                ):
+                    continue
+                self._limb.center(stance.q)
+                ahead = self._limb.data.oMf[self._limb.frame].rotation.T @ stance.approach
+                source = f"{tip.source}, on a stub of {mm(length)}: else links would be in the part"
+                offset = (tip.offset + length * ahead).round(6)
+                return replace(tip, offset=offset, source=source, ahead=ahead)
+        return None
 
     def _stances(self, approach: Array, height: float | None) -> list[Stance]:
         """Return postures for an approach, at a `height` [m] above the floor if it is given."""

@@ -216,4 +216,5 @@ class PressSearch(Search):
             f"that were tried; {_ADVICE['links']}",
             frame,
             other_ends(self.model, frame),
+            bench.out_of_limb(),
         )

@@ -58,12 +58,14 @@ class CannotStand(SphshellError):
 class CannotReach(SphshellError):
     """The links of a limb would be in the part wherever its tip, on `frame`, touches that.
 
-    `others` are frames at the ends of other limbs.
+    `others` are frames at the ends of other limbs, `out` is a tip farther out of the limb.
     """
 
-    def __init__(self, said: str, frame: str, others: Sequence[str]) -> None:
+    def __init__(
+        self, said: str, frame: str, others: Sequence[str], out: Tip | None = None
+    ) -> None:
         super().__init__(said)
-        self.frame, self.others = frame, others
+        self.frame, self.others, self.out = frame, others, out
 
 
 class Search(ABC):
