@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, gripper_
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.searching import CannotReach, NewScenario
+from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
 from tests import urdf
@@ -483,3 +485,22 @@ def test_a_ball_between_walls_is_carried_out_of_them(draft, tmp_path: Path) -> N
     assert log.normal_force[log.t > log.t.max() - 0.2].mean() == pytest.approx(force, rel=0.05)
     with pytest.raises(CannotReach, match="'cup' would be in the part"):
         draft(file, frame="tip", radius=0.01)
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_where_only_edges_were_touched_the_links_were_in_the_way(load, even: bool) -> None:
+    """Elsewhere the force fails for another reason, which another limb would have, too."""
+    robot = load(body("left", "right"))
+    (tip,) = tips_of(robot)
+    search = SimpleNamespace(
+        asked=SimpleNamespace(place=None),
+        bench=SimpleNamespace(postures=1, blocked={"link": 1}, out_of_limb=lambda: tip),
+        model=robot.model,
+        tip=tip,
+        faults=[Fault("force", "the force of 5 N is not held")],
+        even=even,
+        failed=lambda: "no draft works",
+    )
+    error = PressSearch._refusal(search)
+    assert isinstance(error, CannotReach) != even
+    assert "no draft works; take a smaller --radius" in str(error)

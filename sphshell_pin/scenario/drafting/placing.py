@@ -88,7 +88,7 @@ class Bench:
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
         # What was come across: postures, places that were tried, and links that were in the part.
         self.postures, self.tried, self.blocked = 0, 0, Counter[str]()
-        self._covered: list[tuple[Stance, pin.SE3]] = []
+        self._covered: list[tuple[Stance, pin.SE3, bool]] = []
 
     def places(
         self,
@@ -140,7 +140,7 @@ class Bench:
                     found = self._links.within(stance.q, part, whole=True)
                     if found is not None:
                         self.blocked[found] += 1
-                        self._covered.append((stance, part))
+                        self._covered.append((stance, part, on_face))
                         continue
                     bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
                     raised = bottom + float(placement.translation[2]) - self._links.floor
@@ -162,9 +162,9 @@ class Bench:
 
         None where that would be longer than the limb at each place that was tried.
         """
-        tip, some = self._limb.tip, self._covered[:: len(self._covered) // _LOOKED + 1]
+        tip, even = self._limb.tip, [one for one in self._covered if one[2]] or self._covered
         for length in [rounded(one) for one in _STUBS * tip.radius]:
-            for stance, part in some:
+            for stance, part, _ in even[:: len(even) // _LOOKED + 1]:
                 away = -length * stance.approach
                 if length > stance.reach or self._links.within(
                     stance.q, nearer(part, away), whole=True

@@ -94,6 +94,8 @@ class PressSearch(Search):
         self.room = _ROOM * tip.radius
         self.bench = Bench(self.held, self.limb, q, 2 * TIP_GAP * tip.radius)
         self.errors: list[SphshellError] = []
+        self.even = False
+        """Whether the sphere touched one face in some place that was tried."""
         self.stays: list[Press] = []
         """What presses in one place, where a path failed."""
         self.ways: list[str] = []
@@ -137,6 +139,7 @@ class PressSearch(Search):
             except SphshellError as error:  # of this posture: another one may do
                 self.errors.append(error)
                 continue
+            self.even |= found.on_face
             gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
             way = find_way(asked, place, self.held, radius, gap, self.room)
@@ -201,8 +204,13 @@ class PressSearch(Search):
                 f"the tip on frame '{frame}' cannot move {way} in any posture that was tried: its "
                 "joints do not allow it; take another --place or --frame"
             )
+        others = other_ends(self.model, frame)
         if self.faults:
-            return SphshellError(f"{self.failed()}; {_ADVICE[self.faults[-1].kind]}")
+            said = f"{self.failed()}; {_ADVICE[self.faults[-1].kind]}"
+            # The force is held on faces, which links may have kept the tip from.
+            if self.even or not bench.blocked:
+                return SphshellError(said)
+            return CannotReach(said, frame, others, bench.out_of_limb())
         if self.errors:
             return self.errors[0]
         if self.ways:
@@ -215,6 +223,6 @@ class PressSearch(Search):
             f"{counted(bench.postures, 'posture')} and {counted(bench.tried, 'place')} on the part "
             f"that were tried; {_ADVICE['links']}",
             frame,
-            other_ends(self.model, frame),
+            others,
             bench.out_of_limb(),
         )
