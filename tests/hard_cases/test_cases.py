@@ -23,6 +23,7 @@ def test_every_module_has_cases() -> None:
 
 
 def test_a_case_runs_in_a_process_of_its_own() -> None:
-    found = measure(quick=True, only="impact of Hunt")
-    assert [verdict.ok for verdict in found] == [True] * 4
+    found = measure(quick=True, only="impact without damping")
+    assert found
+    assert all(verdict.ok for verdict in found)
     assert {verdict.group for verdict in found} == {"Impacts"}

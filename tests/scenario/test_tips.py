@@ -430,6 +430,18 @@ def test_a_heavy_body_with_one_caster_floats(load) -> None:
     parts += joint("roll", "fork", "wheel", "continuous", "0 0 0", "0 1 0")
     assert only_turns(load(parts).model)
     assert not only_turns(load(parts.replace("50", "5")).model)
+    assert only_turns(load(parts.replace("0 1 0", "0 1 0.1")).model)
+
+
+def test_of_several_ends_without_names_the_freest_is_taken(load) -> None:
+    """The jaws of a gripper that moves by itself, and no more."""
+    parts = link("hand", ".1 .1 .05")
+    for side, y in (("left", ".03"), ("right", "-.03"), ("middle", "0")):
+        parts += link(side, ".01 .01 .1", "0 0 .05")
+        parts += joint(f"{side}_j", "hand", side, "prismatic", f"0 {y} .03", "0 1 0")
+    (tip,) = tips_of(load(parts))
+    assert tip.frame == "left"
+    assert "the freest of 3 ends" in tip.source
 
 
 def test_of_the_spheres_of_a_finger_the_outermost_is_its_tip(load) -> None:

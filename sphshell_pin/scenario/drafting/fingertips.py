@@ -118,10 +118,15 @@ def only_turns(model: pin.Model) -> bool:
     }
     leaves = turns or _leaves(model)
     depths = [len(model.supports[j]) - first for j in leaves]
-    endless = all("RUB" in model.joints[j].shortname() for j in leaves)
+    endless = all(_is_endless(model, j) for j in leaves)
     carried = sum(one.mass for one in list(model.inertias)[first:])
     heavy = model.inertias[first - 1].mass > carried * (1 if len(depths) > 1 else _MUCH)
     return endless and heavy and max(depths, default=3) <= 2
+
+
+def _is_endless(model: pin.Model, joint: int) -> bool:
+    """Whether a joint turns without end, about whatever axis: by a cosine and a sine."""
+    return bool(model.joints[joint].nq == 2 and model.joints[joint].nv == 1)
 
 
 def every_finger(robot: LoadedRobot) -> list[Tip]:
@@ -237,7 +242,7 @@ def _limbs(model: pin.Model, held: Collection[int]) -> set[int]:
     longest = max(chains.values(), key=len, default=set())
 
     def endless(chain: set[int]) -> bool:
-        return all("RUB" in model.joints[j].shortname() for j in chain)
+        return all(_is_endless(model, j) for j in chain)
 
     def is_limb(chain: set[int]) -> bool:
         own = chain - longest
@@ -297,9 +302,11 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     if free and len(names) > 1:
         return [(name, _LOWEST) for name in names]
     if free or len(model.supports[last]) <= 2:
+        if names:
+            return [(_freest(model, names), f"the freest of {len(names)} ends, others: --frame")]
         raise SphshellError(
             "the robot has several ends: state which frame carries the sphere with --frame, for "
-            f"instance one of {', '.join(names[:8]) or ', '.join(f.name for f in model.frames)}"
+            f"instance one of {', '.join(frame.name for frame in model.frames)}"
         )
     which = "only limb" if len(leaves) == 1 else f"longest of {len(leaves)} limbs"
     return [(str(model.names[last]), f"the end of the {which}")]
