@@ -54,6 +54,20 @@ def test_contacts_are_those_of_the_trimmed_faces(name, step):
     assert walk_file(path, name, 2000, np.random.default_rng(2)).found() == {}
 
 
+def test_beside_the_apex_of_a_cone_a_sphere_touches_once(tmp_path):
+    """There the cone's closest point and the apex, a corner, are one place."""
+    shell = sp.Shell.from_file(write_step(occ.cone(20.0, 0.0, 30.0), tmp_path / "cone.step"))
+    rng = np.random.default_rng(1)
+    slope = np.arctan2(20.0, 30.0)
+    for away in 10 ** rng.uniform(-12, -6, 300):
+        angle, radius = rng.uniform(0, 2 * np.pi), rng.uniform(2, 10) * MM
+        turned = np.array([np.cos(angle), np.sin(angle)])
+        normal = np.append(np.cos(slope) * turned, np.sin(slope))
+        foot = np.append(away * np.sin(slope) * turned, 30 * MM - away * np.cos(slope))
+        contacts = shell.contacts(foot + 0.99 * radius * normal, radius)
+        assert contacts.weight.sum() == pytest.approx(1, abs=1e-12)
+
+
 def test_chord_error_does_not_matter(step):
     coarse, fine = (sp.Shell.from_file(step, chord_error=e) for e in (7e-4, 7e-6))
     assert len(fine.triangles) > 5 * len(coarse.triangles)

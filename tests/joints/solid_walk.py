@@ -22,9 +22,6 @@ DEPTHS = 1e-6, 0.9
 BESIDE = 1e-6, 0.5
 """How far from the joint [mm]."""
 
-APEX = 1e-3
-"""Spheres touch cones farther than that from their axes [mm]."""
-
 NEAR = 1e-3
 """Points of one minimum are nearer than this to each other [radii]."""
 
@@ -94,10 +91,6 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
         kept = away > r + solid.size / 100
     else:
         kept = np.ones(len(r), bool)
-    for cone in (one for one in solid.surfaces if one.kind == "Cone"):
-        distance, normal = cone.closest(at)
-        foot = at - distance[:, None] * normal
-        kept &= np.linalg.norm(np.cross(foot - cone.point, cone.axis), axis=1) > APEX
     return SolidSpheres(at[kept], r[kept], [joints[k] for k in np.flatnonzero(kept)])
 
 
