@@ -110,7 +110,7 @@ def add_limits(root: ET.Element) -> Iterator[str]:
         negative = []
         for joint in root.iter("joint"):
             for limit in joint.findall("limit"):
-                if limit.attrib.setdefault(key, "0").strip().startswith("-"):
+                if limit.get(key, "").strip().startswith("-"):
                     limit.set(key, "0")
                     negative.append(joint)
         if negative:
