@@ -4,11 +4,15 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+import sphshell_pin as sp
+from sphshell_pin.dynamics.scene.models import model_reach
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SetupWarning
 from sphshell_pin.scenario import build, explain_built
 from sphshell_pin.scenario.drafting.new import new_scenario
+from sphshell_pin.scenario.live.acting import targets_of
 from sphshell_pin.scenario.running.run import simulate
 from tests.command import call
 from tests.models import pose_of
@@ -86,6 +90,19 @@ def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
     expected = np.linalg.norm(away - normal * (normal @ away))
     assert far.startswith("the controller's target was never in reach: frame 'tip'")
     assert float(far.split("than ")[1].split(" m")[0]) == pytest.approx(expected, rel=0.01)
+
+
+def test_a_robot_whose_joints_are_at_one_place_is_as_large_as_its_links():
+    """A cart with a pole: a target of 1e-10 m beside it is not out of its reach."""
+    model = pin.Model()
+    cart = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "cart")
+    pole = model.addJoint(cart, pin.JointModelRY(), pin.SE3.Identity(), "pole")
+    model.appendBodyToJoint(
+        pole, pin.Inertia.FromSphere(1.0, 0.05), pin.SE3(np.eye(3), np.array([0.0, 0.3, 0.4]))
+    )
+    assert model_reach(model) == pytest.approx(0.5)
+    sliding, _ = targets_of(sp.JointPD(10.0, 1.0), model, pin.neutral(model))
+    assert (sliding.low, sliding.high) == pytest.approx((-0.5, 0.5))
 
 
 def test_the_commands_say_so(scenario, tmp_path):

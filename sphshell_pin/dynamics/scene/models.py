@@ -139,12 +139,13 @@ def radius_fault(model: pin.Model, radius: float) -> str | None:
 
 
 def model_reach(model: pin.Model) -> float:
-    """Length [m] of the longest chain of joint placements: the robot's size."""
-    reach = np.zeros(model.njoints)
+    """Length [m] of the longest chain of joint placements to a link's mass: the robot's size."""
+    reach, ends = np.zeros(model.njoints), [0.0]
     for j in range(1, model.njoints):
         step = float(np.linalg.norm(model.jointPlacements[j].translation))
         reach[j] = reach[model.parents[j]] + step
-    return float(reach.max())
+        ends.append(float(reach[j] + np.linalg.norm(model.inertias[j].lever)))
+    return max(ends)
 
 
 def mass_matrix(model: pin.Model, q: Array) -> Array:
