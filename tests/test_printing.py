@@ -8,13 +8,14 @@ import os
 import shutil
 import signal
 import sys
+import time
 from pathlib import Path
 
 import pytest
 import typer
 
 from sphshell_pin.cli import app, main
-from sphshell_pin.cli.common import echo
+from sphshell_pin.cli.common import echo, progress_bar
 from sphshell_pin.scenario import run_scenario
 from sphshell_pin.study import report
 from sphshell_pin.study.report.contents import Finding, Section
@@ -117,3 +118,12 @@ def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypa
 
 def test_these_are_all_commands():
     assert {*typer.main.get_command(app).commands} == {*WORDS}
+
+
+def test_on_a_pipe_lines_say_that_work_goes_on(capsys):
+    with progress_bar("searching", line_every=0.01, total=None):
+        time.sleep(0.2)
+    said = capsys.readouterr().err.splitlines()
+    assert said[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
+    time.sleep(0.05)
+    assert not capsys.readouterr().err.splitlines()[1:]  # one may be on its way

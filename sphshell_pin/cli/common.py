@@ -6,10 +6,12 @@ import contextlib
 import contextvars
 import functools
 import inspect
+import itertools
 import logging
 import os
 import re
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -342,20 +344,35 @@ def terminal(*, err: bool = False) -> Console:
 
 
 @contextlib.contextmanager
-def progress_bar(title: str, *columns: str, **task: Any) -> Iterator[Callable[..., None]]:
-    """Show a bar on stderr, with `columns`; yield what updates its `task`. On a pipe it is silent.
+def progress_bar(
+    title: str, *columns: str, line_every: float | None = None, **task: Any
+) -> Iterator[Callable[..., None]]:
+    """Show a bar on stderr, with `columns`; yield what updates its `task`.
 
-    Columns are texts, as TextColumn has them, or names of other classes of rich.progress.
+    Columns are texts, as TextColumn has them, or names of other classes of rich.progress. On a pipe
+    a line says each `line_every` seconds that work goes on, if that is given.
     """
     from rich import progress
+
+    def say_lines(seconds: float) -> None:
+        for k in itertools.count(1):
+            if over.wait(seconds):
+                return
+            echo(f"{title}: {k * seconds:g} s", err=True)
 
     made = (
         getattr(progress, one)() if one.isidentifier() else progress.TextColumn(one)
         for one in ("{task.description}", "BarColumn", *columns)
     )
     console, silent = terminal(err=True), not sys.stderr.isatty()
+    over = threading.Event()
+    if silent and line_every:
+        threading.Thread(target=say_lines, args=(line_every,), daemon=True).start()
     with progress.Progress(*made, console=console, transient=True, disable=silent) as bar:
-        yield functools.partial(bar.update, bar.add_task(title, **task))
+        try:
+            yield functools.partial(bar.update, bar.add_task(title, **task))
+        finally:
+            over.set()
 
 
 def plain(text: str) -> str:

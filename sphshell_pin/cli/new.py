@@ -79,9 +79,9 @@ def new(
         _list_robots(robot)
     from sphshell_pin.scenario.drafting.new import new_scenario
 
-    title = f"{robot} and {surface}: searching posture, place and values"
+    title = f"{Path(robot).name} and {Path(surface).name}: searching posture, place and values"
     try:
-        with common.progress_bar(title, "TimeElapsedColumn", total=None):
+        with common.progress_bar(title, "TimeElapsedColumn", line_every=2.0, total=None):
             made = new_scenario(
                 robot,
                 surface,
