@@ -1,8 +1,8 @@
 #include "shell/faces/coplanar.hpp"
 
 #include <Eigen/Dense>
+#include <array>
 #include <cstring>
-#include <tuple>
 
 #include "shell/in_parallel.hpp"
 
@@ -11,10 +11,40 @@ namespace {
 
 // Facets whose normals differ by more than this (cosine) are not in one plane, slivers included.
 constexpr double kSameSide = 0.9;
-// Triangles within so many tolerances of a plane may be in it once it is fitted, to so many
-// triangles at least, so many times.
+// Triangles within so many tolerances of a plane may be in it once it is fitted. Fits go on until
+// so many triangles were looked at per triangle of the region, and these in small ones.
 constexpr double kBeside = 30;
-constexpr std::size_t kFewToFit = 3, kMostFits = 6;
+constexpr std::size_t kMostVisits = 8, kFewVisits = 300;
+// Coordinates that are known to a larger share of the size are rounded coarsely: two triangles of a
+// plane may be off each other's.
+constexpr double kPrecise = 3e-7;
+
+// The plane of least squares over the areas of triangles, by their moments about a point.
+class PlaneFit {
+ public:
+  explicit PlaneFit(const Vec3& about) : about_(about) {}
+
+  void add(double area, const std::array<Vec3, 3>& corners) {
+    area_ += area;
+    for (const Vec3& x : corners) {
+      first_ += area / 3 * (x - about_);
+      second_ += area / 3 * (x - about_) * (x - about_).transpose();
+    }
+  }
+
+  Vec3 middle() const { return about_ + first_ / area_; }
+  // On the side of `side`.
+  Vec3 normal(const Vec3& side) const {
+    const Eigen::Matrix3d spread = second_ / area_ - first_ / area_ * (first_ / area_).transpose();
+    const Vec3 out = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
+    return out.dot(side) < 0 ? Vec3(-out) : out;
+  }
+
+ private:
+  Vec3 about_, first_ = Vec3::Zero();
+  Eigen::Matrix3d second_ = Eigen::Matrix3d::Zero();
+  double area_ = 0;
+};
 
 }  // namespace
 
@@ -32,6 +62,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     for (const int v : triangles[t]) most = std::max(most, std::abs((p[v] - origin).dot(normal)));
     return most;
   };
+  const double near = (tolerance > kPrecise * shell.size() ? kBeside : 1) * tolerance;
   LargeArray<float> area(count);
   LargeArray<std::uint64_t> order(count);
   std::vector<int> found;
@@ -46,8 +77,7 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     alone_[t] = 1;
     for (int k = 0; k < 3 && alone_[t]; ++k) {
       const int h = topology.other_half_edge(static_cast<int>(3 * t) + k);
-      alone_[t] =
-          h < 0 || !(off_plane(triangle_of(h), topology.face_normal[t], p[c[0]]) <= tolerance);
+      alone_[t] = h < 0 || !(off_plane(triangle_of(h), topology.face_normal[t], p[c[0]]) <= near);
     }
   });
   // The largest triangle of a region gives its plane, as its normal is the most exact.
@@ -63,20 +93,15 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
       regions_.push_back(out);
       continue;
     }
-    Vec3 origin = p[triangles[first][0]];
     Eigen::AlignedBox3d box;
-    // The plane of the largest triangle is off far from it, by the rounding of its corners: where
-    // triangles stand off by little, the plane is fitted to what was found, which is looked for
-    // again.
-    std::pair<Vec3, Vec3> last;  // normal and origin before the fit
-    bool settled = false;
-    for (std::size_t before = 0, round = 0;; ++round) {
-      bool any_beside = false;
-      const auto lies_in_plane = [&](int t) {
-        const double most = off_plane(t, out.normal, origin);
-        any_beside = any_beside || (most > tolerance && most < kBeside * tolerance);
-        return most <= tolerance;
-      };
+    std::size_t visits = 0;
+    int next = -1;  // the nearest of the triangles beside
+    std::pair<Vec3, Vec3> plane{out.normal, p[triangles[first][0]]};  // normal and origin
+    found.clear();
+    const auto flood = [&] {
+      double nearest = kBeside * tolerance;
+      next = -1;
+      for (const int t : found) of_[t] = -1;
       box.setEmpty(), out.area = 0;
       of_[first] = region;
       found.assign(1, first);
@@ -86,41 +111,45 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
         for (int k = 0; k < 3; ++k) {
           box.extend(p[triangles[t][k]]);
           const int h = topology.other_half_edge(3 * t + k);
-          if (h < 0) continue;
+          if (h < 0 || of_[triangle_of(h)] >= 0) continue;
           const int u = triangle_of(h);
-          if (of_[u] >= 0 || !lies_in_plane(u)) continue;
+          const double off = off_plane(u, plane.first, plane.second);
+          if (off > tolerance) {
+            if (off < nearest) nearest = off, next = u;
+            continue;
+          }
           of_[u] = region;
           found.push_back(u);
         }
       }
-      if (!settled && found.size() < before) {
-        // The fit was ill-conditioned, as of needles in a line: back to the plane before.
-        std::tie(out.normal, origin) = last;
-        settled = true;
-        for (const int t : found) of_[t] = -1;
-        continue;
+      visits += found.size();
+    };
+    flood();
+    // The plane of the largest triangle is off far from it, by the rounding of its corners: where
+    // triangles stand off by little, the plane is fitted to what was found, and then to the nearest
+    // of them as well, and all is looked for again. A fit may be ill-conditioned, as of needles in
+    // a line.
+    for (bool grew = true; grew && next >= 0 && visits < kMostVisits * found.size() + kFewVisits;) {
+      grew = false;
+      const std::size_t before = found.size();
+      const int beside = next;
+      PlaneFit fit(plane.second);
+      const auto add = [&](int t) {
+        const Triangle& c = triangles[t];
+        fit.add(area[t], {p[c[0]], p[c[1]], p[c[2]]});
+      };
+      for (const int t : found) add(t);
+      for (const bool with_beside : {false, true}) {
+        if (grew) break;
+        const std::pair<Vec3, Vec3> last = plane;
+        if (with_beside) add(beside);
+        plane = {fit.normal(out.normal), fit.middle()};
+        flood();
+        grew = found.size() > before;
+        if (found.size() < before + with_beside) plane = last, flood();
       }
-      if (settled || !any_beside || found.size() < kFewToFit || found.size() == before ||
-          round == kMostFits)
-        break;
-      last = {out.normal, origin};
-      before = found.size();
-      // Least squares over the areas, by their moments about the first triangle.
-      Vec3 middle = Vec3::Zero();
-      for (const int t : found)
-        for (const int v : triangles[t]) middle += area[t] / (3 * out.area) * (p[v] - origin);
-      Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-      for (const int t : found)
-        for (const int v : triangles[t]) {
-          const Vec3 off = p[v] - origin - middle;
-          second += area[t] / out.area * off * off.transpose();
-        }
-      const Vec3 normal =
-          Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second).eigenvectors().col(0);
-      out.normal = normal.dot(out.normal) < 0 ? Vec3(-normal) : normal;
-      origin += middle;
-      for (const int t : found) of_[t] = -1;
     }
+    out.normal = plane.first;
     out.count = static_cast<int>(found.size());
     for (const int t : found) alone_[t] = found.size() == 1;
     out.extent = box.diagonal().norm();

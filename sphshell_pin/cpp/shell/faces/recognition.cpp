@@ -255,6 +255,32 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions(const std::vecto
   return out;
 }
 
+// How far a region reaches from the middle of a side, straight across it [m]: a strip that goes
+// around a corner is no wider there than elsewhere.
+double Recognizer::reach_across(int h) const {
+  const int region = regions_.of(triangle_of(h));
+  const auto vertex = [&](int half_edge) {
+    return corners(triangle_of(half_edge))[side_of(half_edge)];
+  };
+  const Vec3 &first = point(vertex(h)),
+             &last = point(vertex(3 * triangle_of(h) + next_corner(side_of(h))));
+  const Vec3 middle = (first + last) / 2, along = (last - first).normalized();
+  const Vec3 across = regions_.normal(region).cross(along);
+  double reach = 0;
+  for (int steps = 0;
+       h >= 0 && regions_.of(triangle_of(h)) == region && steps < regions_.count(region); ++steps) {
+    const int t = triangle_of(h), k = side_of(h);
+    const bool beyond = (point(corners(t)[previous_corner(k)]) - middle).dot(along) > 0;
+    const int side = beyond ? previous_corner(k) : next_corner(k);
+    const Vec3 x = point(corners(t)[side]) - middle,
+               y = point(corners(t)[next_corner(side)]) - middle;
+    const double share = x.dot(along) / (x.dot(along) - y.dot(along));
+    reach = std::max(reach, (x + share * (y - x)).dot(across));
+    h = shell_.topology().other_half_edge(3 * t + side);
+  }
+  return reach;
+}
+
 // Coplanar triangles with a vertex more than a plane needs, that are wider across each smooth side
 // than what turns away from them there: the long side of a turn does not bend.
 void Recognizer::add_planes(Faces& faces) const {
@@ -295,7 +321,10 @@ void Recognizer::add_planes(Faces& faces) const {
       if (u < 0 || regions_.of(u) == regions_.of(int(t))) continue;
       const bool few = regions_.count(regions_.of(int(t))) < kFewOfPlane;
       auto& [narrow, alike, sagitta] = turns[row[regions_.of(int(t))]];
-      const double here = width(h), there = width(topology.other_half_edge(h));
+      const int g = topology.other_half_edge(h);
+      const double here = width(h);
+      double there = width(g);
+      if (regions_.count(regions_.of(u)) >= kFewOfPlane) there = std::min(there, reach_across(g));
       if (here > (few ? kFarLarger : kFarther) * there)
         narrow = std::max(narrow, turn(int(t), u));
       else if (of_[u] < 0)  // else its normals are known

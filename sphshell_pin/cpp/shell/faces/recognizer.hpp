@@ -146,6 +146,7 @@ class Recognizer {
   // Whether it was taken.
   bool take(Growth growth);
   void drop_zones_of_free_shapes();
+  double reach_across(int half_edge) const;  // [m]
   void add_planes(Faces& faces) const;
   // Of coplanar regions of several triangles.
   struct Moments {
