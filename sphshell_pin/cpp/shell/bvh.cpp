@@ -26,7 +26,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
 
   // Divides triangles by the mean of their middles, along the longest side of their box; in halves
   // where they have the same one. How many come first, and the boxes of both parts.
-  const auto divide = [&](int first, int count, const Box& box, Box (&part)[2]) {
+  const auto divide = [&](int first, int count, const Box& box, Box(&part)[2]) {
     int* const here = order.data() + first;
     const Vec3 size = box.sizes();
     const int axis = size[0] >= size[1] && size[0] >= size[2] ? 0 : size[1] >= size[2] ? 1 : 2;
@@ -75,8 +75,7 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
     nodes_.emplace_back();
     for (int side = 0; side < 2; ++side) {
       store(nodes_[id], side, part[side]);
-      const int added =
-          add(first + side * left, side ? count - left : left, part[side], depth + 1);
+      const int added = add(first + side * left, side ? count - left : left, part[side], depth + 1);
       nodes_[id].child[side] = added;
     }
     return id;

@@ -33,16 +33,16 @@ constexpr double kContradiction = 0.01;
 constexpr double kTakesOver = 0.44;
 
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
-// cone: seen from the vertices around it does not bend that much.
-bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
-                  const int* end) {
+// cone: seen from the vertices around it does not bend that much. normal_at(corner).
+template <class NormalAt>
+bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, const int* begin, const int* end) {
   double uneven = 0, bent = 0;
   for (const int* c = begin; c != end; ++c) {
     const int t = *c / 3, k = *c % 3;
     const Triangle& triangle = shell.triangles()[t];
     for (int far : {next_corner(k), previous_corner(k)}) {
       const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
-      const double here = -normals[*c].dot(edge), there = normals[3 * t + far].dot(edge);
+      const double here = -normal_at(*c).dot(edge), there = normal_at(3 * t + far).dot(edge);
       // On a circular arc a chord leaves both tangent planes by the same angle; on a cone's ruling
       // that of the far end is zero.
       uneven += std::abs(here - there) / edge.norm();
@@ -168,23 +168,20 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
       if (!known(*c)) out[*c] = normal, trust[*c] = how;
   };
   // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
-  std::vector<Vec3> plain;
   const auto spread = [&](int fan, bool beside) {
     double cosine = 1;
     for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
-      cosine = std::min(cosine, plain[*c].dot(topology.face_normal[*c / 3]));
+      cosine = std::min(cosine, out[*c].dot(topology.face_normal[*c / 3]));
       for (int k = 0; beside && k < 3; ++k)
-        cosine = std::min(cosine, plain[*c].dot(plain[*c / 3 * 3 + k]));
+        cosine = std::min(cosine, out[*c].dot(out[*c / 3 * 3 + k]));
     }
     return std::acos(std::clamp(cosine, -1.0, 1.0));
   };
-  for (int fan = 0; fan < count; ++fan)
-    if (fans.begin(fan) != fans.end(fan))
-      set(fan, max_normal(shell, fans.begin(fan), fans.end(fan)), Trust::Averaged);
-  plain = out;
+  const auto mean = [&](int fan) { return max_normal(shell, fans.begin(fan), fans.end(fan)); };
+  for (int fan = 0; fan < count; ++fan) set(fan, mean(fan), Trust::Averaged);
   std::vector<int> around;
   std::vector<Vec3> points;
-  const std::vector<char> none(out.size(), 0);
+  const std::vector<char> none(fans.size(), 0);
   const auto gather = [&](int fan, const std::vector<char>& sharp, std::vector<int>& vertices,
                           std::vector<Vec3>& at) {
     fans.vertices_around(fan, sharp, vertices);
@@ -195,7 +192,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   // Whether both fits leave next to nothing and agree: an uneven sampling of a smooth surface.
   const auto fits_surely = [&](int fan) {
     const Vec3 origin = gather(fan, none, around, points);
-    Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
+    Vec3 quadratic = out[*fans.begin(fan)], cubic = quadratic;
     double doubt;
     return fit_normal<5>(origin, points, quadratic, doubt, kLittle) &&
            fit_normal<9>(origin, points, cubic, doubt, kLittle) &&
@@ -223,10 +220,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own. No
   // fit looks past what is sharp, a face, or limited.
   const Dominance dominance(shell, regions);
-  std::vector<char> settled(out.size(), 0), sharp(out.size(), 0);
+  std::vector<char> settled(none), sharp(none);
+  const auto plain = [&](int c) { return known(c) ? out[c] : mean(fans.of(c)); };
   for (int fan = 0; fan < count; ++fan) {
     const int *begin = fans.begin(fan), *end = fans.end(fan);
-    if (begin == end) continue;
     if (take_over(fan)) {
       settled[fan] = sharp[fan] = 1;
       continue;
@@ -248,10 +245,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
       settled[fan] = sharp[fan] = 1;
     }
   }
-  plain = out;
+  LargeArray<Vec3> fitted(fans.size());  // zero where none is trusted; taken when all are done
   const auto fit = [&](int fan, std::vector<int>& near, std::vector<Vec3>& at) {
     const Vec3 origin = gather(fan, sharp, near, at);
-    const Vec3 own = plain[*fans.begin(fan)];
+    const Vec3 own = out[*fans.begin(fan)];
     Vec3 quadratic = own, cubic = own;
     // Two models of different order: where both fit and agree the points determine the normal.
     double doubt;
@@ -266,19 +263,22 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
     if (fits && fits_better ? agree(quadratic, cubic, kLikely * wide)
                             : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
-      set(fan, cubic, Trust::Fitted);
+      fitted[fan] = cubic;
     else if (fits && !fits_better &&
              agree(quadratic, own, open ? 1.1 * wide : kLikely * spread(fan, false)))
-      set(fan, quadratic, Trust::Fitted);
+      fitted[fan] = quadratic;
   };
   in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
               [&](std::size_t begin, std::size_t end) {
                 std::vector<int> near;
                 std::vector<Vec3> at;
-                for (std::size_t fan = begin; fan < end; ++fan)
-                  if (fans.begin(fan) != fans.end(fan) && !settled[fan])
-                    fit(static_cast<int>(fan), near, at);
+                for (std::size_t fan = begin; fan < end; ++fan) {
+                  fitted[fan].setZero();
+                  if (!settled[fan]) fit(static_cast<int>(fan), near, at);
+                }
               });
+  for (int fan = 0; fan < count; ++fan)
+    if (!fitted[fan].isZero(0)) set(fan, fitted[fan], Trust::Fitted);
   return {std::move(out), std::move(trust), false};
 }
 
