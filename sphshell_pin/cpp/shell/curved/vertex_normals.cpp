@@ -1,7 +1,5 @@
 #include "shell/curved/vertex_normals.hpp"
 
-#include <Eigen/Dense>
-
 #include "shell/curved/creases.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/curved/limiter.hpp"
@@ -12,7 +10,8 @@ namespace {
 // A fit leaves at most this share of the squared heights: what curves more unevenly is noise, or
 // the end of a fillet.
 constexpr double kMostUneven = 0.1;
-// Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
+// Smallest pivot of the normal equations beside its diagonal element: below, the points do not tell
+// the terms apart.
 constexpr double kLeastPivot = 1e-6;
 // The frame turns with the normal: a few rounds settle both. A tilt that settles it [rad].
 constexpr int kNormalFits = 3;
@@ -52,6 +51,44 @@ bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, const int* begin, co
   return uneven > 0.5 * bent;
 }
 
+// Symmetric equations of a few terms, unrolled: Eigen's solvers of this size take four times as
+// long. factor() leaves L and D of a = L D L^T in the lower triangle; false where columns are
+// nearly dependent.
+template <int Terms>
+bool factor(Eigen::Matrix<double, Terms, Terms>& a) {
+  const Eigen::Matrix<double, Terms, 1> diagonal = a.diagonal();
+#pragma GCC unroll 9
+  for (int k = 0; k < Terms; ++k) {
+    if (!(a(k, k) > kLeastPivot * diagonal[k])) return false;
+    const double inverse = 1 / a(k, k);
+#pragma GCC unroll 9
+    for (int j = k + 1; j < Terms; ++j) {
+      const double share = a(j, k) * inverse;
+#pragma GCC unroll 9
+      for (int i = j; i < Terms; ++i) a(i, j) -= a(i, k) * share;
+    }
+#pragma GCC unroll 9
+    for (int i = k + 1; i < Terms; ++i) a(i, k) *= inverse;
+  }
+  return true;
+}
+
+template <int Terms>
+Eigen::Matrix<double, Terms, 1> solve(const Eigen::Matrix<double, Terms, Terms>& factors,
+                                      Eigen::Matrix<double, Terms, 1> x) {
+#pragma GCC unroll 9
+  for (int j = 0; j < Terms; ++j)
+#pragma GCC unroll 9
+    for (int i = j + 1; i < Terms; ++i) x[i] -= factors(i, j) * x[j];
+#pragma GCC unroll 9
+  for (int j = Terms - 1; j >= 0; --j) {
+    x[j] /= factors(j, j);
+#pragma GCC unroll 9
+    for (int i = j + 1; i < Terms; ++i) x[j] -= factors(i, j) * x[i];
+  }
+  return x;
+}
+
 // The normal at `origin` of the surface through it that fits the points around best. Heights over
 // the tangent plane are those of circular arcs whose curvature is a quadratic form of the
 // direction, z = a x + b y + (A x^2 + 2 B x y + C y^2) (x^2 + y^2 + z^2) / (2 (x^2 + y^2)), so that
@@ -86,8 +123,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
       if constexpr (Terms == 9)
         row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
-      // Normal equations, of which the solver reads the lower triangle; unrolled, else half of the
-      // time of the estimate is spent here.
+      // Normal equations, their lower triangle; unrolled, as what solves them.
       const Row weighted = weight * row;
 #pragma GCC unroll 9
       for (int j = 0; j < Terms; ++j)
@@ -96,13 +132,8 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       along += weight * z * row;
       heights2 += weight * z * z;
     }
-    // Columns scaled alike, so that the pivots tell how nearly dependent they are.
-    const Row size = square.diagonal().cwiseSqrt();
-    if (!(size.minCoeff() > 0)) return false;
-    const Eigen::LDLT<Square> solver(size.cwiseInverse().asDiagonal() * square *
-                                     size.cwiseInverse().asDiagonal());
-    if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
-    const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
+    if (!factor(square)) return false;
+    const Row fit = solve(square, along);
     const double left = std::max(heights2 - fit.dot(along), kLeastLeft * heights2);
     if (round > 0 && left > most_uneven * heights2) return false;
     // The gradient of the height at the origin tilts the normal.
@@ -115,7 +146,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     // the diagonal of the inverse.
     double variance = 0;
     for (int k = 0; k < 2; ++k) {
-      const double inverse = solver.solve(Row(Row::Unit(k)))[k] / (size[k] * size[k]);
+      const double inverse = solve(square, Row(Row::Unit(k)))[k];
       variance = std::max(variance, left / double(points.size() - Terms) * inverse);
     }
     doubt = std::sqrt(variance);
