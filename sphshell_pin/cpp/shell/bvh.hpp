@@ -1,4 +1,5 @@
-// Bounding-box tree over the triangles of a shell.
+// Bounding-box tree over the triangles of a shell, divided at the mean of their middles along the
+// longest side of their box.
 #pragma once
 
 #include <limits>
