@@ -52,31 +52,22 @@ Bvh::Bvh(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangl
       for (const int v : triangles[here[i]]) part[i >= left].extend(vertices[v]);
     return left;
   };
-  // A few triangles become a leaf: they are tested faster than their boxes. What is near in it
-  // stays side by side in memory all the same. Walks have a stack of fixed size, and so have these
-  // functions.
-  const std::function<void(int, int, const Box&)> arrange = [&](int first, int count,
-                                                                const Box& box) {
-    if (count < 2) return;
-    Box part[2];
-    const int left = divide(first, count, box, part);
-    arrange(first, left, part[0]), arrange(first + left, count - left, part[1]);
-  };
+  // A few triangles become a leaf, as they are tested faster than their boxes, but are divided all
+  // the same: what is near then lies side by side in memory. Walks have a stack of fixed size, and
+  // so has this function.
   const std::function<int(int, int, const Box&, int)> add = [&](int first, int count,
                                                                 const Box& box, int depth) {
-    if (count <= kLeafSize) {
-      arrange(first, count, box);
-      return leaf(first, count);
-    }
-    if (depth + 2 >= kMaxDepth)
+    if (depth + 1 >= kMaxDepth)
       throw std::length_error("the bounding-box tree of the shell is too deep");
+    const bool is_node = count > kLeafSize;
+    const int id = is_node ? static_cast<int>(nodes_.size()) : leaf(first, count);
+    if (is_node) nodes_.emplace_back();
+    if (count < 2) return id;
     Box part[2];
-    const int left = divide(first, count, box, part), id = static_cast<int>(nodes_.size());
-    nodes_.emplace_back();
+    const int left = divide(first, count, box, part);
     for (int side = 0; side < 2; ++side) {
-      store(nodes_[id], side, part[side]);
       const int added = add(first + side * left, side ? count - left : left, part[side], depth + 1);
-      nodes_[id].child[side] = added;
+      if (is_node) store(nodes_[id], side, part[side]), nodes_[id].child[side] = added;
     }
     return id;
   };
