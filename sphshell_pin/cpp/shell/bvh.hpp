@@ -1,5 +1,5 @@
-// Bounding-box tree over the triangles of a shell. Coal builds it; the walk is ours: Coal's own
-// collision traversal costs an order of magnitude more and reports every triangle as a contact.
+// Bounding-box tree over the triangles of a shell, divided at the mean of their middles along the
+// longest side of their box.
 #pragma once
 
 #include <limits>

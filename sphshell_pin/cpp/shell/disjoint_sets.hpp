@@ -33,15 +33,13 @@ class DisjointSets {
     parent_[b] = a;
   }
 
-  // Per member the number of its set: consecutive, in the order of first appearance.
+  // Per member the number of its set: consecutive, in the order of first appearance. To be called
+  // last: the numbers take the place of the sets.
   std::vector<std::int32_t> labels() {
-    std::vector<std::int32_t> label(parent_.size());
-    count_ = 0;
-    for (std::size_t i = 0; i < parent_.size(); ++i) {
-      const std::int32_t root = find(static_cast<std::int32_t>(i));
-      label[i] = root == static_cast<std::int32_t>(i) ? count_++ : label[root];
-    }
-    return label;
+    // Parents are lower than their children.
+    for (std::int32_t i = 0; i < static_cast<std::int32_t>(parent_.size()); ++i)
+      parent_[i] = parent_[i] == i ? count_++ : parent_[parent_[i]];
+    return std::move(parent_);
   }
   // How many sets labels() found.
   std::int32_t count() const { return count_; }

@@ -39,8 +39,8 @@ void build_edges(std::size_t vertices, const std::vector<Triangle>& triangles, T
   const std::size_t half_edges = 3 * triangles.size();
   out.edge_of.resize(half_edges);
   out.incidence.reserve(half_edges);
-  LargeArray<Edge> edges;
-  edges.reserve(half_edges);
+  // Enough unless most are on borders; what is not needed is never touched.
+  out.edges.reserve(half_edges * 5 / 8);
   const auto ends = [&](std::size_t h) {
     const Triangle& t = triangles[h / 3];
     const int k = static_cast<int>(h % 3);
@@ -56,12 +56,11 @@ void build_edges(std::size_t vertices, const std::vector<Triangle>& triangles, T
     for (const std::uint64_t* word = first; word != last; ++word) {
       const int h = static_cast<int>(static_cast<std::uint32_t>(*word));
       out.incidence.push_back(h);
-      out.edge_of[h] = static_cast<int>(edges.size());
+      out.edge_of[h] = static_cast<int>(out.edges.size());
     }
-    edges.push_back(edge);
+    out.edges.push_back(edge);
   };
   for_each_edge(half_edges, vertices, ends, add);
-  out.edges.assign(edges.begin(), edges.end());
 }
 
 // Coplanar neighbors become one face with one normal: that of their summed areas, so that a
@@ -189,7 +188,7 @@ void build_vertices(const std::vector<Vec3>& vertices, const std::vector<Triangl
 // Corners that edges connect are one fan. A vertex with several fans joins sheets in a point only.
 void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, Topology& out) {
   const int corners = static_cast<int>(3 * triangles.size());
-  DisjointSets fans(corners), pieces(triangles.size());
+  DisjointSets fans(corners);
   const auto vertex = [&](int c) { return triangles[triangle_of(c)][side_of(c)]; };
   for (const Edge& edge : out.edges)
     for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i) {
@@ -206,6 +205,7 @@ void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, 
   if (found.empty()) return;
   for (int c = 0; c < corners; ++c)
     if (fans_at[vertex(c)] > 1) found[vertex(c)][fans.find(c)].push_back(c);
+  DisjointSets pieces(triangles.size());
   for (const Edge& edge : out.edges)
     for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i)
       pieces.merge(triangle_of(out.incidence[edge.begin]), triangle_of(out.incidence[i]));

@@ -79,6 +79,7 @@ Weld weld(Points points, double tolerance) {
   for (std::size_t i = 0; i < count; ++i) {
     const std::int32_t first = groups.find(static_cast<std::int32_t>(i));
     out.representative[i] = first;
+    if (first == static_cast<std::int32_t>(i)) continue;
     const Vec3 off = place(points, i) - place(points, first);
     out.largest_distance = std::max(out.largest_distance, std::hypot(off[0], off[1], off[2]));
   }

@@ -26,22 +26,23 @@ Net control_points(const Facet& f, const CurvedFacet& curved) {
 // Bound on the tangent of the angle between `axis` and any normal of the patch: its normal field
 // lies in the hull of products of the tangents' control vectors.
 double tan_opening_of(const Net& net, const Vec3& axis) {
-  std::array<Vec3, 6> a, b;
+  std::array<Vec3, 6> a, b;  // the last coordinate along the axis
+  const Vec3 east = axis.unitOrthogonal(), north = axis.cross(east);
+  const auto seen = [&](const Vec3& d) { return Vec3(east.dot(d), north.dot(d), axis.dot(d)); };
   int n = 0;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; i + j < 3; ++j, ++n) {
       // Control vectors of the derivatives by u and v, both of degree 2.
-      a[n] = net[i + 1][j] - net[i][j];
-      b[n] = net[i][j + 1] - net[i][j];
+      a[n] = seen(net[i + 1][j] - net[i][j]);
+      b[n] = seen(net[i][j + 1] - net[i][j]);
     }
   double most = 0, beside = 1;  // of the widest: squares of what is across the axis, and along it
   for (int i = 0; i < 6; ++i)
     for (int j = i; j < 6; ++j) {
       // x_u x x_v has degree 4; its control vectors are positive sums of these symmetric products.
       const Vec3 normal = a[i].cross(b[j]) + a[j].cross(b[i]);
-      const double along = normal.dot(axis);
-      if (!(along > 0)) return kAny;
-      const double across2 = normal.cross(axis).squaredNorm(), along2 = along * along;
+      if (!(normal.z() > 0)) return kAny;
+      const double across2 = normal.head<2>().squaredNorm(), along2 = normal.z() * normal.z();
       if (across2 * beside > most * along2) most = across2, beside = along2;
     }
   return std::sqrt(most / beside);
@@ -222,10 +223,11 @@ void CurvedShell::leave_joints_whole(const Shell& shell) {
 // Bounds of each element, and what lies beyond its sides.
 void CurvedShell::bound_cells(const Shell& shell) {
   const Topology& topology = shell.topology();
-  cells_.assign(facets_.size(), CellBounds{});
+  cells_.resize(facets_.size());
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = shell.facets()[f];
-    if (!facets_[f].flat) cells_[f] = bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
+    cells_[f] = facets_[f].flat ? CellBounds{}
+                                : bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
     cells_[f].bulge = facets_[f].bulge;
     for (int k = 0; k < 3; ++k) {
       const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;

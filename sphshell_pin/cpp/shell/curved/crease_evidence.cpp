@@ -50,7 +50,6 @@ std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
                                       const std::vector<Vec3>& normals) {
   std::vector<char> out(normals.size(), 0);
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0) continue;
     const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
     for (const int* c = fans.begin(f); c != fans.end(f); ++c) out[*c] = !(off <= kAveraged * lean);
   }
@@ -62,7 +61,6 @@ std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
 bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& normals) {
   int leaning = 0, means = 0;
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0) continue;
     const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
     if (lean <= kSameNormal) continue;
     ++leaning;
@@ -83,9 +81,9 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   const double height = a.cross(b).norm() / length;
   // With the normal at the opposite corner, and those at the joint's ends, the element is a
   // quadratic: its rise and its slope across the joint follow.
-  const double at_first = -normals_[o].dot(a), at_last = -normals_[o].dot(b);
+  const double at_first = -normals()[o].dot(a), at_last = -normals()[o].dot(b);
   const double far_first = a.dot(along), far_last = b.dot(along);
-  const double bend_first = normals_[i].dot(along), bend_last = normals_[j].dot(along);
+  const double bend_first = normals()[i].dot(along), bend_last = normals()[j].dot(along);
   // The nearer end is more accurate: at the other a cone has become narrower, say.
   const double weight_first = std::sqrt(b.norm()), weight_last = std::sqrt(a.norm());
   const double rise = (weight_first * (at_first - bend_first * far_first) +
@@ -133,7 +131,7 @@ void CreaseSearch::classify_joints() {
     const Joint& joint = joints_[e];
     if (crease_[e] || joint.angle == 0) return;  // planar: nothing turns
     if (is_settled(e)) {
-      smooth_[e] = 1;
+      smooth_[e] = 1, estimates_[e] = {};
       return;
     }
     const SideEstimate a = estimate_side(now, joint.half_edge[0]),
@@ -180,14 +178,15 @@ void CreaseSearch::weigh_runs() {
     const Edge& edge = shell_.topology().edges[e];
     return (points()[edge.first_vertex] + points()[edge.last_vertex]) / 2;
   };
-  std::vector<std::size_t> open;  // joints that do not have enough yet
+  std::vector<int> open;  // joints that do not have enough yet
+  open.reserve(count);
   for (std::size_t e = 0; e < count; ++e)
-    if (core_[e]) open.push_back(e);
+    if (core_[e]) open.push_back(static_cast<int>(e));
   for (int step = 0; step < kLongestRun && !open.empty(); ++step) {
     // Each step carries evidence one joint farther along the run, to either side.
     next.assign(open.size(), {0, 0});
     for (std::size_t n = 0; n < open.size(); ++n) {
-      const std::size_t e = open[n];
+      const int e = open[n];
       const Vec3 here = middle(e);
       for (int side = 0; side < 2; ++side) {
         float& most = next[n][side];

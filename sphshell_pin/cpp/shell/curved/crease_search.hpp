@@ -58,9 +58,12 @@ class CreaseSearch {
   void start();
   // Joined where there is no crease by now; kept until crease_ changes.
   const Fans& fans();
-  // Fills normals_ and divided_ by those fans.
+  // Fills divided_normals_ and divided_ by those fans.
   void divide_normals();
-  void forget_fans() { fans_.reset(), normals_.clear(); }
+  const std::vector<Vec3>& normals() const {
+    return divided_normals_.empty() ? original_ : divided_normals_;
+  }
+  void forget_fans() { fans_.reset(), divided_normals_.clear(), divided_.clear(); }
   SideEstimate estimate_side(const Fans& fans, int h) const;
   bool reaches_beyond(const Fans& fans, int h) const;
   // Fills what is known of each joint, from estimates of both its sides.
@@ -84,17 +87,17 @@ class CreaseSearch {
   const Shell& shell_;
   bool given_;
   const Faces& faces_;
-  std::vector<Vec3> original_, normals_;
-  std::vector<int> original_count_;  // per corner: of its fan before it was divided
-  std::vector<char> divided_;        // per corner
-  std::vector<char> independent_;    // per corner, of given normals
-  std::vector<Joint> joints_;        // per edge
-  std::vector<int> edge_at_;         // beside Topology::neighbors
-  std::vector<char> crease_;         // per edge, as all that follows
+  std::vector<Vec3> original_, divided_normals_;  // the latter where they differ
+  std::vector<int> original_count_;               // per corner: of its fan before it was divided
+  std::vector<char> divided_;                     // per corner
+  std::vector<char> independent_;                 // per corner, of given normals
+  LargeArray<Joint> joints_;                      // per edge
+  LargeArray<int> edge_at_;                       // beside Topology::neighbors
+  std::vector<char> crease_;                      // per edge, as all that follows
   std::vector<char> explained_, alike_, core_, smooth_;
   std::vector<float> off_, evidence_;
   std::vector<std::array<float, 2>> run_;  // evidence beyond either side
-  std::vector<std::array<SideEstimate, 2>> estimates_;
+  LargeArray<std::array<SideEstimate, 2>> estimates_;
   std::optional<Fans> fans_;
 };
 

@@ -92,31 +92,31 @@ const Fans& CreaseSearch::fans() {
 // whose normals were fitted across what is a crease now.
 void CreaseSearch::divide_normals() {
   const Fans& fans = this->fans();
-  if (!normals_.empty()) return;
-  normals_ = original_;
+  if (!divided_.empty()) return;
   divided_.assign(original_.size(), 0);
   const int corners = static_cast<int>(original_.size());
   for (int c = 0; c < corners; ++c) divided_[c] = fans.count(fans.of(c)) < original_count_[c];
-  std::vector<char> beside(original_.size(), 0);  // per fan
+  std::vector<char> beside(fans.size(), 0);
   if (!given_) {
     for (int c = 0; c < corners; ++c)
       if (divided_[c])
         for (int k : {corner_after(c), corner_before(c)}) beside[fans.of(k)] = !divided_[k];
     // A closed fan has as many joints as corners.
-    std::vector<int> joints(original_.size(), 0);
+    std::vector<int> joints(fans.size(), 0);
     for (std::size_t e = 0; e < joints_.size(); ++e) {
       if (crease_[e] || !joints_[e].exists()) continue;
       const int h = joints_[e].half_edge[0];
       ++joints[fans.of(h)], ++joints[fans.of(corner_after(h))];
     }
-    for (int f = 0; f < corners; ++f) beside[f] = beside[f] && joints[f] < fans.count(f);
+    for (int f = 0; f < fans.size(); ++f) beside[f] = beside[f] && joints[f] < fans.count(f);
   }
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0 || !(divided_[*fans.begin(f)] || beside[f]) ||
+    if (!(divided_[*fans.begin(f)] || beside[f]) ||
         std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
       continue;
     const Vec3 normal = max_normal(shell_, fans.begin(f), fans.end(f));
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
+    if (divided_normals_.empty()) divided_normals_ = original_;
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) divided_normals_[*c] = normal;
   }
 }
 
@@ -227,11 +227,11 @@ void CreaseSearch::separate_straight_walls() {
 void CreaseSearch::lean_as_other_ends(const Fans& fans) {
   std::vector<std::pair<int, Vec3>> found;  // first all, as they are estimated from each other
   for (int f = 0; f < fans.size(); ++f) {
-    if (fans.count(f) == 0 || !divided_[*fans.begin(f)] ||
+    if (!divided_[*fans.begin(f)] ||
         std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
       continue;
     constexpr double kTrust = 0.01;  // in the fan's own elements
-    const Vec3& own = normals_[*fans.begin(f)];
+    const Vec3& own = normals()[*fans.begin(f)];
     // Least squares: perpendicular to what the sides' tangents would be, each mirrored from its
     // other end, and near the own normal.
     Eigen::Matrix3d square = kTrust * Eigen::Matrix3d::Identity();
@@ -243,7 +243,7 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
         if (divided_[w]) continue;
         const Vec3 d = (points()[vertex(w)] - points()[vertex(*c)]).normalized();
         square += d * d.transpose();
-        along -= d * normals_[w].dot(d);
+        along -= d * normals()[w].dot(d);
       }
     }
     const Vec3 normal = square.ldlt().solve(along).normalized();
@@ -251,7 +251,7 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
     if ((normal - own).norm() <= 1.5 * before) found.push_back({f, normal});
   }
   for (const auto& [f, normal] : found)
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) normals_[*c] = normal;
+    for (const int* c = fans.begin(f); c != fans.end(f); ++c) divided_normals_[*c] = normal;
 }
 
 // Classification depends on the estimates, which change as fans are divided: repeated until nothing
@@ -264,13 +264,13 @@ CornerNormals CreaseSearch::divide() {
   }
   if (!given_) separate_straight_walls();
   // Building takes the most memory here.
-  std::vector<std::array<SideEstimate, 2>>().swap(estimates_);
+  LargeArray<std::array<SideEstimate, 2>>().swap(estimates_);
   std::vector<std::array<float, 2>>().swap(run_);
   divide_normals();
   lean_as_other_ends(fans());
   CornerNormals out;
   out.creases = static_cast<int>(std::count(crease_.begin(), crease_.end(), 1) - before);
-  out.normals = std::move(normals_);
+  out.normals = std::move(divided_normals_.empty() ? original_ : divided_normals_);
   out.set_aside = std::move(divided_);
   return out;
 }

@@ -27,6 +27,7 @@ double tolerance_of(const Shell& shell, const CurveOptions& options) {
 // after another.
 SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normals)
     : which_(normals.size()) {
+  distinct_.reserve(shell.vertices().size());
   LargeArray<int> latest(shell.vertices().size(), -1);
   for (std::size_t c = 0; c < normals.size(); ++c) {
     int& last = latest[shell.triangles()[c / 3][c % 3]];
@@ -105,11 +106,7 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   face_cells_ = std::move(cells.of);
   intruders_ = std::move(cells.intruders);
   inexact_ = std::move(cells.inexact);
-  if (std::any_of(face_cells_.begin(), face_cells_.end(),
-                  [](const FaceCell& cell) { return cell.closed; }))
-    gap_ = kMostGap * shell.size();
-  else
-    face_cells_ = {};
+  if (!face_cells_.empty()) gap_ = kMostGap * shell.size();
   build_cones(shell);
   bound_cells(shell);
   if (!face_cells_.empty()) face_search_ = std::make_unique<FaceSearch>(shell, *this);

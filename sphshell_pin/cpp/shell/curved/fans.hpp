@@ -6,8 +6,7 @@
 
 namespace sphshell {
 
-// A corner (3 triangle + k) belongs to one fan. Fans are numbered below size(); most numbers are
-// empty.
+// A corner (3 triangle + k) belongs to one fan. Fans are numbered by their first corners.
 class Fans {
  public:
   // is_smooth(edge): whether the two triangles of an edge join the fans at its ends.
@@ -26,17 +25,17 @@ class Fans {
       sets.merge(h, opposed ? g1 : g);
       sets.merge(h1, opposed ? g : g1);
     }
-    // Counting sort of the corners by fan.
-    begin_.assign(corners + 1, 0);
-    fan_of_.resize(corners);
-    for (int c = 0; c < corners; ++c) ++begin_[(fan_of_[c] = sets.find(c)) + 1];
-    for (int c = 0; c < corners; ++c) begin_[c + 1] += begin_[c];
-    std::vector<int> fill(begin_.begin(), begin_.end() - 1);
+    // Counting sort of the corners by fan; begin_[fan + 1] runs from its beginning to its end.
+    fan_of_ = sets.labels();
+    begin_.assign(sets.count() + 2, 0);
+    for (const int fan : fan_of_) ++begin_[fan + 2];
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
     members_.resize(corners);
-    for (int c = 0; c < corners; ++c) members_[fill[fan_of_[c]]++] = c;
+    for (int c = 0; c < corners; ++c) members_[begin_[fan_of_[c] + 1]++] = c;
+    begin_.pop_back();
   }
 
-  int size() const { return static_cast<int>(fan_of_.size()); }
+  int size() const { return static_cast<int>(begin_.size()) - 1; }
   int of(int corner) const { return fan_of_[corner]; }
   int count(int fan) const { return begin_[fan + 1] - begin_[fan]; }
   const int* begin(int fan) const { return members_.data() + begin_[fan]; }
@@ -76,7 +75,8 @@ class Fans {
   static constexpr std::size_t kFew = 64;  // numbers that are looked through one by one
 
   const Shell& shell_;
-  std::vector<int> begin_, fan_of_, members_;
+  std::vector<int> begin_, fan_of_;
+  LargeArray<int> members_;
 };
 
 // What a facet counts for at its corner, and the normal of a fan, exact where the vertices lie on a

@@ -35,6 +35,7 @@ class SagittaWitness {
   template <class IsSmooth>
   SagittaWitness(const Shell& shell, const CoplanarRegions& regions, IsSmooth&& is_smooth)
       : regions_(regions), sagitta_(static_cast<std::size_t>(regions.size()), 0) {
+    sides_.reserve(shell.topology().edges.size());
     for (const Edge& edge : shell.topology().edges)
       if (edge.count == 2 && is_smooth(edge)) add(shell, edge);
     find_usual();

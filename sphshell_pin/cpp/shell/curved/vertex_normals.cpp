@@ -1,7 +1,5 @@
 #include "shell/curved/vertex_normals.hpp"
 
-#include <Eigen/Dense>
-
 #include "shell/curved/creases.hpp"
 #include "shell/in_parallel.hpp"
 #include "shell/curved/limiter.hpp"
@@ -12,7 +10,8 @@ namespace {
 // A fit leaves at most this share of the squared heights: what curves more unevenly is noise, or
 // the end of a fillet.
 constexpr double kMostUneven = 0.1;
-// Smallest pivot of the scaled normal equations: below, the points do not tell the terms apart.
+// Smallest pivot of the normal equations beside its diagonal element: below, the points do not tell
+// the terms apart.
 constexpr double kLeastPivot = 1e-6;
 // The frame turns with the normal: a few rounds settle both. A tilt that settles it [rad].
 constexpr int kNormalFits = 3;
@@ -33,16 +32,16 @@ constexpr double kContradiction = 0.01;
 constexpr double kTakesOver = 0.44;
 
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
-// cone: seen from the vertices around it does not bend that much.
-bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const int* begin,
-                  const int* end) {
+// cone: seen from the vertices around it does not bend that much. normal_at(corner).
+template <class NormalAt>
+bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, const int* begin, const int* end) {
   double uneven = 0, bent = 0;
   for (const int* c = begin; c != end; ++c) {
     const int t = *c / 3, k = *c % 3;
     const Triangle& triangle = shell.triangles()[t];
     for (int far : {next_corner(k), previous_corner(k)}) {
       const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
-      const double here = -normals[*c].dot(edge), there = normals[3 * t + far].dot(edge);
+      const double here = -normal_at(*c).dot(edge), there = normal_at(3 * t + far).dot(edge);
       // On a circular arc a chord leaves both tangent planes by the same angle; on a cone's ruling
       // that of the far end is zero.
       uneven += std::abs(here - there) / edge.norm();
@@ -50,6 +49,44 @@ bool is_cone_apex(const Shell& shell, const std::vector<Vec3>& normals, const in
     }
   }
   return uneven > 0.5 * bent;
+}
+
+// Symmetric equations of a few terms, unrolled: Eigen's solvers of this size take four times as
+// long. factor() leaves L and D of a = L D L^T in the lower triangle; false where columns are
+// nearly dependent.
+template <int Terms>
+bool factor(Eigen::Matrix<double, Terms, Terms>& a) {
+  const Eigen::Matrix<double, Terms, 1> diagonal = a.diagonal();
+#pragma GCC unroll 9
+  for (int k = 0; k < Terms; ++k) {
+    if (!(a(k, k) > kLeastPivot * diagonal[k])) return false;
+    const double inverse = 1 / a(k, k);
+#pragma GCC unroll 9
+    for (int j = k + 1; j < Terms; ++j) {
+      const double share = a(j, k) * inverse;
+#pragma GCC unroll 9
+      for (int i = j; i < Terms; ++i) a(i, j) -= a(i, k) * share;
+    }
+#pragma GCC unroll 9
+    for (int i = k + 1; i < Terms; ++i) a(i, k) *= inverse;
+  }
+  return true;
+}
+
+template <int Terms>
+Eigen::Matrix<double, Terms, 1> solve(const Eigen::Matrix<double, Terms, Terms>& factors,
+                                      Eigen::Matrix<double, Terms, 1> x) {
+#pragma GCC unroll 9
+  for (int j = 0; j < Terms; ++j)
+#pragma GCC unroll 9
+    for (int i = j + 1; i < Terms; ++i) x[i] -= factors(i, j) * x[j];
+#pragma GCC unroll 9
+  for (int j = Terms - 1; j >= 0; --j) {
+    x[j] /= factors(j, j);
+#pragma GCC unroll 9
+    for (int i = j + 1; i < Terms; ++i) x[j] -= factors(i, j) * x[i];
+  }
+  return x;
 }
 
 // The normal at `origin` of the surface through it that fits the points around best. Heights over
@@ -86,8 +123,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       row.template head<5>() << x, y, arc * x * x, arc * x * y, arc * y * y;
       if constexpr (Terms == 9)
         row.template tail<4>() << x * x * x, x * x * y, x * y * y, y * y * y;
-      // Normal equations, of which the solver reads the lower triangle; unrolled, else half of the
-      // time of the estimate is spent here.
+      // Normal equations, their lower triangle; unrolled, as what solves them.
       const Row weighted = weight * row;
 #pragma GCC unroll 9
       for (int j = 0; j < Terms; ++j)
@@ -96,13 +132,8 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
       along += weight * z * row;
       heights2 += weight * z * z;
     }
-    // Columns scaled alike, so that the pivots tell how nearly dependent they are.
-    const Row size = square.diagonal().cwiseSqrt();
-    if (!(size.minCoeff() > 0)) return false;
-    const Eigen::LDLT<Square> solver(size.cwiseInverse().asDiagonal() * square *
-                                     size.cwiseInverse().asDiagonal());
-    if (!(solver.vectorD().cwiseAbs().minCoeff() > kLeastPivot)) return false;
-    const Row fit = solver.solve(along.cwiseQuotient(size)).cwiseQuotient(size);
+    if (!factor(square)) return false;
+    const Row fit = solve(square, along);
     const double left = std::max(heights2 - fit.dot(along), kLeastLeft * heights2);
     if (round > 0 && left > most_uneven * heights2) return false;
     // The gradient of the height at the origin tilts the normal.
@@ -115,7 +146,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
     // the diagonal of the inverse.
     double variance = 0;
     for (int k = 0; k < 2; ++k) {
-      const double inverse = solver.solve(Row(Row::Unit(k)))[k] / (size[k] * size[k]);
+      const double inverse = solve(square, Row(Row::Unit(k)))[k];
       variance = std::max(variance, left / double(points.size() - Terms) * inverse);
     }
     doubt = std::sqrt(variance);
@@ -168,23 +199,20 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
       if (!known(*c)) out[*c] = normal, trust[*c] = how;
   };
   // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
-  std::vector<Vec3> plain;
   const auto spread = [&](int fan, bool beside) {
     double cosine = 1;
     for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
-      cosine = std::min(cosine, plain[*c].dot(topology.face_normal[*c / 3]));
+      cosine = std::min(cosine, out[*c].dot(topology.face_normal[*c / 3]));
       for (int k = 0; beside && k < 3; ++k)
-        cosine = std::min(cosine, plain[*c].dot(plain[*c / 3 * 3 + k]));
+        cosine = std::min(cosine, out[*c].dot(out[*c / 3 * 3 + k]));
     }
     return std::acos(std::clamp(cosine, -1.0, 1.0));
   };
-  for (int fan = 0; fan < count; ++fan)
-    if (fans.begin(fan) != fans.end(fan))
-      set(fan, max_normal(shell, fans.begin(fan), fans.end(fan)), Trust::Averaged);
-  plain = out;
+  const auto mean = [&](int fan) { return max_normal(shell, fans.begin(fan), fans.end(fan)); };
+  for (int fan = 0; fan < count; ++fan) set(fan, mean(fan), Trust::Averaged);
   std::vector<int> around;
   std::vector<Vec3> points;
-  const std::vector<char> none(out.size(), 0);
+  const std::vector<char> none(fans.size(), 0);
   const auto gather = [&](int fan, const std::vector<char>& sharp, std::vector<int>& vertices,
                           std::vector<Vec3>& at) {
     fans.vertices_around(fan, sharp, vertices);
@@ -195,7 +223,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   // Whether both fits leave next to nothing and agree: an uneven sampling of a smooth surface.
   const auto fits_surely = [&](int fan) {
     const Vec3 origin = gather(fan, none, around, points);
-    Vec3 quadratic = plain[*fans.begin(fan)], cubic = quadratic;
+    Vec3 quadratic = out[*fans.begin(fan)], cubic = quadratic;
     double doubt;
     return fit_normal<5>(origin, points, quadratic, doubt, kLittle) &&
            fit_normal<9>(origin, points, cubic, doubt, kLittle) &&
@@ -223,10 +251,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   // What is flat or sharp (its triangles spread more than creases may) keeps its triangles' own. No
   // fit looks past what is sharp, a face, or limited.
   const Dominance dominance(shell, regions);
-  std::vector<char> settled(out.size(), 0), sharp(out.size(), 0);
+  std::vector<char> settled(none), sharp(none);
+  const auto plain = [&](int c) { return known(c) ? out[c] : mean(fans.of(c)); };
   for (int fan = 0; fan < count; ++fan) {
     const int *begin = fans.begin(fan), *end = fans.end(fan);
-    if (begin == end) continue;
     if (take_over(fan)) {
       settled[fan] = sharp[fan] = 1;
       continue;
@@ -248,10 +276,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
       settled[fan] = sharp[fan] = 1;
     }
   }
-  plain = out;
+  LargeArray<Vec3> fitted(fans.size());  // zero where none is trusted; taken when all are done
   const auto fit = [&](int fan, std::vector<int>& near, std::vector<Vec3>& at) {
     const Vec3 origin = gather(fan, sharp, near, at);
-    const Vec3 own = plain[*fans.begin(fan)];
+    const Vec3 own = out[*fans.begin(fan)];
     Vec3 quadratic = own, cubic = own;
     // Two models of different order: where both fit and agree the points determine the normal.
     double doubt;
@@ -266,19 +294,22 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
     if (fits && fits_better ? agree(quadratic, cubic, kLikely * wide)
                             : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
-      set(fan, cubic, Trust::Fitted);
+      fitted[fan] = cubic;
     else if (fits && !fits_better &&
              agree(quadratic, own, open ? 1.1 * wide : kLikely * spread(fan, false)))
-      set(fan, quadratic, Trust::Fitted);
+      fitted[fan] = quadratic;
   };
   in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
               [&](std::size_t begin, std::size_t end) {
                 std::vector<int> near;
                 std::vector<Vec3> at;
-                for (std::size_t fan = begin; fan < end; ++fan)
-                  if (fans.begin(fan) != fans.end(fan) && !settled[fan])
-                    fit(static_cast<int>(fan), near, at);
+                for (std::size_t fan = begin; fan < end; ++fan) {
+                  fitted[fan].setZero();
+                  if (!settled[fan]) fit(static_cast<int>(fan), near, at);
+                }
               });
+  for (int fan = 0; fan < count; ++fan)
+    if (!fitted[fan].isZero(0)) set(fan, fitted[fan], Trust::Fitted);
   return {std::move(out), std::move(trust), false};
 }
 

@@ -93,7 +93,9 @@ class CellMaker {
 
   FaceCells make() {
     if (faces_.of.empty()) return {};
-    out_.of.resize(facets_.size());
+    cell_of_.resize(facets_.size());
+    cells_.reserve(facets_.size() - std::count(faces_.of.begin(), faces_.of.end(), -1) + 1);
+    cells_.emplace_back();
     open_.assign(facets_.size(), 0);
     told_.assign(faces_.shapes.size(), 0);
     one_of_ = first_of_equals(faces_.shapes, shell_.size(), kEqual * shell_.size());
@@ -101,8 +103,12 @@ class CellMaker {
     for (std::size_t f = 0; f < facets_.size(); ++f)
       for (int k = 0; k < 3; ++k) decide(static_cast<int>(f), k);
     settle();
+    if (std::none_of(cells_.begin(), cells_.end(), [](const FaceCell& one) { return one.closed; }))
+      return std::move(out_);
     check_sides();
     find_intruders();
+    out_.of.reserve(facets_.size());
+    for (std::size_t f = 0; f < facets_.size(); ++f) out_.of.push_back(of_facet(f));
     return std::move(out_);
   }
 
@@ -112,6 +118,8 @@ class CellMaker {
     const int face = faces_.of_triangle(shell_.triangle_of_facet(f));
     return face < 0 ? face : one_of_[face];
   }
+  FaceCell& of_facet(std::size_t f) { return cells_[cell_of_[f]]; }
+  const FaceCell& of_facet(std::size_t f) const { return cells_[cell_of_[f]]; }
   bool is_round(int face) const { return face >= 0 && faces_.shapes[face].kind != FaceKind::Plane; }
 
   // The half-edge of the facet beyond a side, if the surface goes on there; else -1.
@@ -132,7 +140,7 @@ class CellMaker {
 
   // How far the cubic of a side is off the facet's face [m].
   double off_face(int f, int k) const {
-    const Primitive& shape = faces_.shapes[out_.of[f].face];
+    const Primitive& shape = faces_.shapes[of_facet(f).face];
     const CubicCurve side = facets_[f].side(shell_.facets()[f], k);
     double most = 0;
     for (const double s : {0.15, 0.3, 0.5, 0.7, 0.85})
@@ -141,8 +149,11 @@ class CellMaker {
   }
 
   void place(int f) {
-    FaceCell& cell = out_.of[f] = FaceCell();
-    if ((cell.face = face_of_facet(f)) < 0) return;
+    const int face = face_of_facet(f);
+    cell_of_[f] = face < 0 ? 0 : static_cast<int>(cells_.size());
+    if (face < 0) return;
+    FaceCell& cell = cells_.emplace_back();
+    cell.face = face;
     const Facet& facet = shell_.facets()[f];
     const Primitive& shape = faces_.shapes[cell.face];
     double first[2] = {0, 0};
@@ -180,7 +191,7 @@ class CellMaker {
 
   // Whether a facet is not on its face as it is.
   bool is_off(int f) const {
-    const int face = out_.of[f].face;
+    const int face = of_facet(f).face;
     if (is_round(face) || !facets_[f].flat) return true;
     const Vec3* p = shell_.facets()[f].corner;
     return std::any_of(p, p + 3, [&](const Vec3& x) {
@@ -190,19 +201,19 @@ class CellMaker {
 
   // Flat facets of planes far from anything round stay as they are.
   bool is_bent(int f) const {
-    const int face = out_.of[f].face;
+    const int face = of_facet(f).face;
     if (face < 0 || is_off(f)) return face >= 0;
     for (int k = 0; k < 3; ++k) {
       const int h = beyond(f, k);
-      if (h >= 0 && is_round(out_.of[triangle_of(h)].face)) return true;
+      if (h >= 0 && is_round(of_facet(triangle_of(h)).face)) return true;
     }
     return false;
   }
 
   void decide(int f, int k) {
-    FaceCell& cell = out_.of[f];
+    FaceCell& cell = of_facet(f);
     if (cell.face < 0 || cell.side[k] == FaceCell::Side::Border) return;  // decided from beyond it
-    const int h = beyond(f, k), other = h < 0 ? -1 : out_.of[triangle_of(h)].face;
+    const int h = beyond(f, k), other = h < 0 ? -1 : of_facet(triangle_of(h)).face;
     if (other == cell.face) cell.side[k] = FaceCell::Side::Inner;
     if (other == cell.face || !(is_bent(f) || (h >= 0 && is_bent(triangle_of(h))))) return;
     cell.bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
@@ -287,18 +298,18 @@ class CellMaker {
         }
         bulge = std::max(bulge, (on - p - s * (q - p)).norm());
         if (s != 0.5) continue;
-        const int face = out_.of[f].face;
+        const int face = of_facet(f).face;
         Vec3 n, away;
         faces_.shapes[face].distance(on, n);
         joint.divide(face, on, away);
-        outward[i] = out_.of[f].sign * n;
+        outward[i] = of_facet(f).sign * n;
         turn[i] = outward[i].cross(q - p).dot(away) < 0 ? -1 : 1;
       }
       if (!(bulge < (q - p).norm())) return false;
     }
     if (joint.tangent && (outward[0].dot(outward[1]) > 0) == (turn[0] == turn[1])) return false;
     for (int i = 0; i < 2; ++i) {
-      FaceCell& cell = out_.of[triangle_of(halves[i])];
+      FaceCell& cell = of_facet(triangle_of(halves[i]));
       const int k = side_of(halves[i]);
       cell.side[k] = FaceCell::Side::Border;
       cell.joint[k] = j, cell.turn[k] = turn[i];
@@ -315,15 +326,15 @@ class CellMaker {
       opened_.pop_back();
       for (int i = 0; i < 3; ++i) {
         const int h = beyond(g, i), f = triangle_of(h), k = side_of(h);
-        if (h < 0 || out_.of[f].face < 0 || open_[f]) continue;
-        out_.of[f].side[k] = FaceCell::Side::Cubic;
-        out_.of[f].bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
-        if (const double off = off_face(f, k); off > gap_) give_up(f, out_.of[g].face, off);
+        if (h < 0 || of_facet(f).face < 0 || open_[f]) continue;
+        of_facet(f).side[k] = FaceCell::Side::Cubic;
+        of_facet(f).bulge[k] = static_cast<float>(kBulgeMargin * bulge_of(f, k) + gap_);
+        if (const double off = off_face(f, k); off > gap_) give_up(f, of_facet(g).face, off);
       }
     }
     std::vector<char> asked(faces_.shapes.size(), 0);
-    for (std::size_t f = 0; f < out_.of.size(); ++f) {
-      FaceCell& cell = out_.of[f];
+    for (std::size_t f = 0; f < facets_.size(); ++f) {
+      FaceCell& cell = of_facet(f);
       if (cell.face < 0) continue;
       // A face is asked for closest points where it, its elements or a neighbor is curved.
       bool needed = is_off(static_cast<int>(f));
@@ -337,8 +348,8 @@ class CellMaker {
       if (cell.closed) asked[cell.face] = 1;
     }
     // And then within it, too: one question for all of its facets.
-    for (std::size_t f = 0; f < out_.of.size(); ++f) {
-      FaceCell& cell = out_.of[f];
+    for (std::size_t f = 0; f < facets_.size(); ++f) {
+      FaceCell& cell = of_facet(f);
       if (cell.face < 0 || cell.closed) continue;
       cell.closed = asked[cell.face] && !open_[f] &&
                     std::all_of(cell.side, cell.side + 3,
@@ -349,11 +360,11 @@ class CellMaker {
 
   // No center is lost at a side, or counted twice, if both facets read one joint there.
   void check_sides() const {
-    for (int h = 0; h < static_cast<int>(3 * out_.of.size()); ++h) {
-      const FaceCell& cell = out_.of[triangle_of(h)];
+    for (int h = 0; h < static_cast<int>(3 * facets_.size()); ++h) {
+      const FaceCell& cell = of_facet(triangle_of(h));
       const int k = side_of(h), g = cell.closed ? beyond(triangle_of(h), k) : -1;
-      if (g < h || !out_.of[triangle_of(g)].closed) continue;
-      const FaceCell& other = out_.of[triangle_of(g)];
+      if (g < h || !of_facet(triangle_of(g)).closed) continue;
+      const FaceCell& other = of_facet(triangle_of(g));
       if (cell.side[k] != other.side[side_of(g)] || cell.joint[k] != other.joint[side_of(g)])
         throw std::logic_error("the facets of side " + std::to_string(h) + " read two joints");
     }
@@ -369,30 +380,30 @@ class CellMaker {
     };
     const auto on_border = [&](int h, double s) -> Vec3 {
       const int f = triangle_of(h), k = side_of(h);
-      const FaceJoint& joint = faces_.joints[out_.of[f].joint[k]];
+      const FaceJoint& joint = faces_.joints[of_facet(f).joint[k]];
       Vec3 x = facets_[f].side(shell_.facets()[f], k).point(s);
       if (joint.kind != FaceJoint::Kind::Crossing) return joint.nearest(x);
       onto_both(faces_.shapes[joint.face[0]], joint.across[0], x);
       return x;
     };
     const auto inside = [&](int f, int k, const Vec3& x, double margin) {
-      const FaceCell& cell = out_.of[f];
+      const FaceCell& cell = of_facet(f);
       const Primitive& shape = faces_.shapes[cell.face];
       const Eigen::Vector2d at = shape.has_parameters() ? shape.parameters(x, shell_.size())
                                                         : Eigen::Vector2d(Eigen::Vector2d::Zero());
       const WithinLine line = within_line(shape, cell, shell_.facets()[f], k, x, at, gap_);
       return line.inside > margin * line.overlap;
     };
-    for (std::size_t f = 0; f < out_.of.size(); ++f)
-      for (int k = 0; k < 3 && out_.of[f].closed; ++k) {
+    for (std::size_t f = 0; f < facets_.size(); ++f)
+      for (int k = 0; k < 3 && of_facet(f).closed; ++k) {
         const int h = 3 * static_cast<int>(f) + k;
-        if (out_.of[f].side[k] != FaceCell::Side::Border || !inside(f, k, on_border(h, 0.5), 1))
+        if (of_facet(f).side[k] != FaceCell::Side::Border || !inside(f, k, on_border(h, 0.5), 1))
           continue;
         borders.push_back(h);
         around[vertex(h)], around[vertex(3 * static_cast<int>(f) + next_corner(k))];
       }
     if (borders.empty()) return;
-    for (std::size_t f = 0; f < out_.of.size(); ++f)
+    for (std::size_t f = 0; f < facets_.size(); ++f)
       for (int k = 0; k < 3; ++k) {
         const auto at = around.find(vertex(3 * static_cast<int>(f) + k));
         if (at != around.end()) at->second.push_back(static_cast<int>(f));
@@ -404,8 +415,8 @@ class CellMaker {
       std::sort(near.begin(), near.end());
       near.erase(std::unique(near.begin(), near.end()), near.end());
       for (const int g : near) {
-        FaceCell& cell = out_.of[g];
-        if (g == f || cell.face != out_.of[f].face) continue;
+        FaceCell& cell = of_facet(g);
+        if (g == f || cell.face != of_facet(f).face) continue;
         for (const double s : {0.01, 0.05, 0.15, 0.3, 0.5, 0.7, 0.85, 0.95, 0.99}) {
           const Vec3 x = on_border(h, s);
           if (!inside(g, 0, x, -1) || !inside(g, 1, x, -1) || !inside(g, 2, x, -1)) continue;
@@ -421,6 +432,9 @@ class CellMaker {
   Faces& faces_;
   const LargeArray<CurvedFacet>& facets_;
   const double gap_;
+  // The first one stands for all facets that are on no face, as most of a free shape are.
+  LargeArray<FaceCell> cells_;
+  LargeArray<int> cell_of_;  // per facet
   FaceCells out_;
   std::vector<char> open_;   // facets that are left to their cubics
   std::vector<int> opened_;  // those whose neighbors do not know of it yet

@@ -41,7 +41,7 @@ struct Inexact {
 };
 
 struct FaceCells {
-  // In the order of the facets; empty where no facet is on a face.
+  // In the order of the facets; empty where no face gives closest points.
   LargeArray<FaceCell> of;
   // Borders that other facets of the face have to know of: half-edge, and the next one or -1.
   std::vector<std::pair<int, int>> intruders;
