@@ -106,7 +106,7 @@ def read_mjcf(root: ET.Element, folders: Folders, *, floats: bool | None = None)
     with interrupts_delayed():
         mujoco = import_extra("mujoco", "mujoco", "an MJCF file")
     if folders.kept is None:
-        mjcf_compile.include(root, [folders.file.resolve()])
+        mjcf_compile.include(root, [folders.file.absolute()])
     elif root.find(".//include") is not None:
         raise ValueError("it includes other files")
     made = mjcf_compile.Compiled(mujoco, root, folders, floats)

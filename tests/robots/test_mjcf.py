@@ -366,15 +366,17 @@ def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
         '<geom density="4000"/></default></default><worldbody>'
         '<body name="b" pos="0 0 .1" euler="0 0.3 0"><joint name="j" axis="0 1 0"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/><body pos="0 0 .3">'
-        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body></worldbody>'
-        "</mujoco>"
+        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body>'
+        '<frame name="f" pos="1 0 0"><body><joint name="n"/><geom size=".1"/></body></frame>'
+        "</worldbody></mujoco>"
     )
     file = tmp_path / "two.xml"
     file.write_text(
         '<mujoco><default><default class="heavy"><geom density="9"/></default></default><asset>'
         '<model name="link" file="link.xml"/></asset><worldbody><body name="c"><joint name="base" '
         'type="slide"/><geom size=".1"/><attach model="link" prefix="l_"/><frame pos="0 .2 0">'
-        '<attach model="link" body="b" prefix="r_"/></frame></body></worldbody></mujoco>'
+        '<attach model="link" body="b" prefix="r_"/></frame><attach model="link" frame="f" '
+        'prefix="f_"/></body></worldbody></mujoco>'
     )
     mujoco = pytest.importorskip("mujoco")
     theirs = mujoco.MjModel.from_xml_path(str(file))
