@@ -6,7 +6,7 @@ import itertools
 import os
 import xml.etree.ElementTree as ET
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -102,7 +102,7 @@ _ATTRIBUTES["compiler"] |= {"settotalmass", "balanceinertia", "inertiafromgeom"}
 _ATTRIBUTES["compiler"] |= {"inertiagrouprange"}
 _DROPPED = ("camera", "light")
 # What makes bodies of its own, without end, or runs a plugin.
-_UNKNOWN = ("composite", "flexcomp", "replicate", "deformable", "flex", "plugin")
+_UNKNOWN = ("composite", "flexcomp", "deformable", "flex", "plugin")
 _MOST_MESH = 1e9  # [B]
 _POINT = [0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]  # a mesh that nothing weighs
 _HULLS = "masses of meshes that are not closed are those of their convex hulls"
@@ -159,7 +159,7 @@ class Compiled:
         attaches, which are put into `models`. Of one that is attached, not `whole`, no keys: it has
         not all joints.
         """
-        root = ET.Element("mujoco", model="robot")
+        root = ET.Element("mujoco", model=stated.get("model", "robot"))
         given = [tag for tag in _GIVEN if whole or tag != "keyframe"]
         root[:] = [copy.deepcopy(one) for one in stated if one.tag in given]
         for tag in _UNKNOWN:  # plugins of actuators and sensors are not read
@@ -170,11 +170,11 @@ class Compiled:
                 )
         inside = dict[str | None, int]()
         for one in root.iterfind("asset/model"):
-            text, inside[one.get("name")] = self._given(one[0], models, whole=False)
+            name = one.get("name", one[0].get("model"))
+            text, inside[name] = self._given(one[0], models, whole=False)
             one.set("file", f"{len(models)}.xml")
             models[one.attrib["file"]] = text.encode()
-        links = sum(1 for _ in root.iterfind("worldbody//body"))
-        links += sum(1 + inside.get(one.get("model"), 0) for one in root.iter("attach"))
+        links = sum(_links(one, inside) for one in root.iterfind("worldbody"))
         if links > MOST_LINKS:
             raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
         for element in root.iter():
@@ -241,6 +241,15 @@ class Compiled:
                 f"the mass of body '{body}' would be that of mesh '{mesh.name}', which cannot be "
                 f"read ({reason}): state <inertial>"
             ) from None
+
+
+def _links(element: ET.Element, inside: Mapping[str | None, int], *, copied: bool = False) -> int:
+    """Return the number of bodies and models in `element`, and of all that it has copies of."""
+    copies = element.tag == "replicate"
+    count = int(copied or element.tag in ("body", "attach"))
+    count += inside.get(element.get("model"), 0) if element.tag == "attach" else 0
+    count += sum(_links(one, inside, copied=copied or copies) for one in element)
+    return count * (abs(int(element.get("count", 1))) if copies else 1)
 
 
 def _name_all(spec: Any) -> None:
