@@ -70,11 +70,6 @@ def meters_per_unit(unit: str) -> float:
     raise InvalidParameter("unit", unit, f"must be one of: {', '.join(METERS_PER_UNIT)}")
 
 
-def length_to_meters(value: float, unit: str) -> float:
-    """Convert a length from `unit` to meters."""
-    return value * meters_per_unit(unit)
-
-
 def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
     """ADAMS stiffness K [force/length^exponent] in [N/m^exponent].
 
@@ -83,12 +78,6 @@ def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-
     """
     length, force = adams_units(units)
     return float(stiffness * force / length**exponent)
-
-
-def adams_stiffness_from_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
-    """Stiffness [N/m^exponent] as ADAMS writes it; the inverse of `adams_stiffness_to_si`."""
-    length, force = adams_units(units)
-    return float(stiffness * length**exponent / force)
 
 
 def adams_damping_to_si(damping: float, units: str = "mm-N-s") -> float:
