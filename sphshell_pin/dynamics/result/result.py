@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.run.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensing.sensors import SensorSet
-    from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
 
@@ -281,7 +280,7 @@ class Result(Summarized):
         path: str | PathLike[str],
         scene: Scene | None = None,
         visual_model: pin.GeometryModel | None = None,
-        **options: Unpack[FilmOptions],
+        **options: Any,
     ) -> Path:
         """Draw this result as a picture (.png) or a film (.mp4).
 
