@@ -20,27 +20,16 @@ METERS_PER_UNIT: dict[str, float] = {
 }
 """Meters in one unit of length."""
 
-_ALIASES: dict[str, str] = {
-    "meter": "m",
-    "metre": "m",
-    "meters": "m",
-    "metres": "m",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "millimeters": "mm",
-    "millimetres": "mm",
-    "centimeter": "cm",
-    "centimetre": "cm",
-    "micrometer": "um",
-    "micrometre": "um",
-    "micron": "um",
-    "µm": "um",
-    "inch": "in",
-    "inches": "in",
-    "foot": "ft",
-    "feet": "ft",
-    "yard": "yd",
+_SPELLINGS = {
+    "m": "meter metre meters metres",
+    "mm": "millimeter millimetre millimeters millimetres",
+    "cm": "centimeter centimetre",
+    "um": "micrometer micrometre micron µm",
+    "in": "inch inches",
+    "ft": "foot feet",
+    "yd": "yard",
 }
+_ALIASES = {one: unit for unit, names in _SPELLINGS.items() for one in names.split()}
 
 ADAMS_UNITS: dict[str, tuple[float, float]] = {
     "mm-N-s": (1e-3, 1.0),
