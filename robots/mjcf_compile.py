@@ -4,6 +4,7 @@ import copy
 import io
 import itertools
 import os
+import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
@@ -249,7 +250,9 @@ def _links(element: ET.Element, inside: Mapping[str | None, int], *, copied: boo
     count = int(copied or element.tag in ("body", "attach"))
     count += inside.get(element.get("model"), 0) if element.tag == "attach" else 0
     count += sum(_links(one, inside, copied=copied or copies) for one in element)
-    return count * (abs(int(element.get("count", 1))) if copies else 1)
+    # What is no number MuJoCo refuses.
+    times = re.match(r"\s*[-+]?(\d+)", element.get("count", "")) if copies else None
+    return count * (int(times[1]) if times else 1)
 
 
 def _name_all(spec: Any) -> None:
