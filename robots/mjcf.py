@@ -106,7 +106,7 @@ def read_mjcf(root: ET.Element, folders: Folders, *, floats: bool | None = None)
     with interrupts_delayed():
         mujoco = import_extra("mujoco", "mujoco", "an MJCF file")
     if folders.kept is None:
-        mjcf_compile.include(root, [folders.file.resolve()])
+        mjcf_compile.include(root, [folders.file.absolute()])
     elif root.find(".//include") is not None:
         raise ValueError("it includes other files")
     made = mjcf_compile.Compiled(mujoco, root, folders, floats)
@@ -262,53 +262,41 @@ class MjcfRobot:
 
     def _drawn(self, j: int) -> pin.SE3:
         """Return the motion of a joint from zero to where the file draws it."""
-        m = self.m
-        moved = m.qpos0[m.jnt_qposadr[j]] * m.jnt_axis[j]
-        if m.jnt_type[j] == mjcf_compile.SLIDE:
-            return pin.SE3(np.eye(3), moved)
-        return pin.SE3(
-            pin.exp3(moved) if m.jnt_type[j] == mjcf_compile.HINGE else np.eye(3), np.zeros(3)
-        )
+        kind, moved = self.m.jnt_type[j], self.m.qpos0[self.m.jnt_qposadr[j]] * self.m.jnt_axis[j]
+        turned = pin.exp3(moved) if kind == mjcf_compile.HINGE else np.eye(3)
+        return pin.SE3(turned, moved if kind == mjcf_compile.SLIDE else np.zeros(3))
 
     def _joint(self, j: int) -> Any:
         kind, axis = int(self.m.jnt_type[j]), self.m.jnt_axis[j]
-        if kind in (mjcf_compile.FREE, mjcf_compile.BALL):
-            return (
-                pin.JointModelFreeFlyer()
-                if kind == mjcf_compile.FREE
-                else pin.JointModelSpherical()
-            )
-        names = ("PX", "PY", "PZ") if kind == mjcf_compile.SLIDE else ("RX", "RY", "RZ")
-        for name, along in zip(names, np.eye(3), strict=True):
-            if (axis == along).all():
-                return getattr(pin, f"JointModel{name}")()
+        if kind < mjcf_compile.SLIDE:
+            made = pin.JointModelFreeFlyer, pin.JointModelSpherical
+            return made[kind]()
+        along, name = np.flatnonzero(axis), ("P", "R")[kind - mjcf_compile.SLIDE]
+        if len(along) == 1 and axis[along] == 1.0:
+            return getattr(pin, f"JointModel{name}{'XYZ'[along[0]]}")()
         kinds = pin.JointModelPrismaticUnaligned, pin.JointModelRevoluteUnaligned
         return kinds[kind - mjcf_compile.SLIDE](axis)
 
     def _limit(self, model: pin.Model) -> None:
-        """Put ranges, damping, dry friction, armature and limits of forces into `model`."""
-        m = self.m
-        friction, damping = np.zeros(model.nv), np.zeros(model.nv)
-        lower, upper = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)
-        effort = -np.full(model.nv, np.inf), np.full(model.nv, np.inf)
-        for j, name in enumerate(self.joints):
-            joint, dof = model.joints[model.getJointId(name)], m.jnt_dofadr[j]
-            span = slice(joint.idx_v, joint.idx_v + joint.nv)
-            damping[span] = np.ravel(m.dof_damping[dof])[0]
-            friction[span] = m.dof_frictionloss[dof]
-            model.armature[span] = m.dof_armature[dof]
-            if joint.nq > 1:
-                at = slice(joint.idx_q, joint.idx_q + joint.nq)
-                lower[at], upper[at] = -1.01, 1.01  # as Pinocchio has them
-            elif m.jnt_limited[j]:
-                lower[joint.idx_q], upper[joint.idx_q] = m.jnt_range[j]
-            if joint.nq == 1 and m.jnt_actfrclimited[j]:
-                effort[0][span], effort[1][span] = m.jnt_actfrcrange[j]
-        model.damping, model.lowerDryFrictionLimit = damping, -friction
-        model.upperDryFrictionLimit = friction
-        model.lowerPositionLimit, model.upperPositionLimit = lower, upper
-        model.lowerEffortLimit, model.upperEffortLimit = effort
-        model.upperVelocityLimit = np.full(model.nv, np.inf)
+        """Put ranges, damping, dry friction, armature and limits of forces into `model`.
+
+        Its coordinates and velocities are numbered as MuJoCo's.
+        """
+        m, endless = self.m, np.array([-np.inf, np.inf])
+        single = m.jnt_type >= mjcf_compile.SLIDE
+        limits = np.full((m.nq, 2), [-1.01, 1.01])  # of free and ball joints as Pinocchio has them
+        efforts = np.full((m.nv, 2), endless)
+        for into, at, limited, ranges in (
+            (limits, m.jnt_qposadr, m.jnt_limited, m.jnt_range),
+            (efforts, m.jnt_dofadr, m.jnt_actfrclimited, m.jnt_actfrcrange),
+        ):
+            into[at[single]] = np.where(limited[single, None], ranges[single], endless)
+        model.damping, model.armature = m.dof_damping.T.ravel()[: m.nv], m.dof_armature
+        model.upperDryFrictionLimit = m.dof_frictionloss
+        model.lowerDryFrictionLimit = -m.dof_frictionloss
+        model.lowerPositionLimit, model.upperPositionLimit = limits.T
+        model.lowerEffortLimit, model.upperEffortLimit = efforts.T
+        model.upperVelocityLimit = np.full(m.nv, np.inf)
         model.lowerVelocityLimit = -model.upperVelocityLimit
 
     def _note(self, made: mjcf_compile.Compiled) -> None:

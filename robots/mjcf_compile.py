@@ -4,14 +4,13 @@ import copy
 import io
 import itertools
 import os
+import re
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.arrays import Array
@@ -26,26 +25,24 @@ MOST_INCLUDED = 64e6
 """What they may have in all [B]."""
 
 
-def include(root: ET.Element, open_files: list[Path], sizes: list[int] | None = None) -> None:
+def include(root: ET.Element, files: list[Path], sizes: list[int] | None = None) -> None:
     """Put the content of included files in the place of <include>, attached models into <model>.
 
-    `sizes` are those of the files so far [B]. The limits hold in total: of small files that include
-    others twice, the whole doubles each time.
+    Meshes get absolute paths. `files` are open, `root` is that of the last of them. `sizes` are
+    those of the files so far [B]. The limits hold in total: of small files that include others
+    twice, the whole doubles each time.
     """
     sizes = [] if sizes is None else sizes
-    _include(root, open_files, sizes)
+    _include(root, files, sizes)
+    compiler = {key: value for part in root.iter("compiler") for key, value in part.items()}
+    folder = files[-1].parent / compiler.get("meshdir", compiler.get("assetdir", ""))
+    for mesh in root.iterfind("asset/mesh[@file]"):
+        path = Path(mesh.attrib["file"])
+        mesh.attrib.setdefault("name", path.stem)
+        mesh.set("file", str(folder / (path.name if compiler.get("strippath") == "true" else path)))
     for one in root.iterfind("asset/model"):
-        path = open_files[-1].parent / one.get("file", "")
-        if not os.path.isfile(path):
-            raise ValueError(f"it attaches {one.get('file')}, which is not there")
-        files = [*open_files, path.resolve()]
-        model = _read(path, files, sizes)
-        include(model, files, sizes)
-        compiler = {key: value for part in model.iter("compiler") for key, value in part.items()}
-        folder = path.absolute().parent / compiler.get("meshdir", compiler.get("assetdir", ""))
-        for mesh in model.iterfind("asset/mesh[@file]"):
-            mesh.set("name", mesh.get("name", Path(mesh.attrib["file"]).stem))
-            mesh.set("file", str(folder / mesh.attrib["file"]))
+        inner, model = _read("attaches", one.get("file", ""), files, sizes)
+        include(model, inner, sizes)
         one[:] = [model]
 
 
@@ -57,21 +54,21 @@ def _include(element: ET.Element, files: list[Path], sizes: list[int], deep: int
         if one.tag != "include":
             _include(one, files, sizes, deep + 1)
             continue
-        stated = one.get("file", "")
-        places = [files[0].parent / stated, files[-1].parent / stated]
-        found = next((place for place in places if os.path.isfile(place)), None)
-        if found is None:
-            raise ValueError(f"it includes {stated}, which is not there")
-        if found.resolve() in files:
-            raise ValueError(f"it includes {stated}, which includes itself")
-        inner = [*files, found.resolve()]
-        root = _read(found, inner, sizes)
+        inner, root = _read("includes", one.get("file", ""), files, sizes)
         _include(root, inner, sizes, deep)
         element[k : k + 1] = list(root)
 
 
-def _read(path: Path, files: list[Path], sizes: list[int]) -> ET.Element:
-    """Return the root of one more file; `files` are open, it is the last of them."""
+def _read(
+    does: str, stated: str, files: list[Path], sizes: list[int]
+) -> tuple[list[Path], ET.Element]:
+    """Return the open files with the one that the last of them includes or attaches; its root."""
+    homes = (files[0].parent, files[-1].parent, files[-1].resolve().parent)
+    path = next((home / stated for home in homes if os.path.isfile(home / stated)), None)
+    if path is None:
+        raise ValueError(f"it {does} {stated}, which is not there")
+    if path.resolve() in [one.resolve() for one in files]:
+        raise ValueError(f"it {does} {stated}, which {does} itself")
     text = read_bytes(path, MOST_INCLUDED)
     sizes.append(len(text))
     if len(sizes) > MOST_FILES or sum(sizes) > MOST_INCLUDED:
@@ -79,10 +76,10 @@ def _read(path: Path, files: list[Path], sizes: list[int]) -> ET.Element:
             f"it includes more than {MOST_FILES} files or {MOST_INCLUDED * 1e-6:g} MB in all, "
             "repeats counted: write each part once"
         )
-    if len(files) > DEEPEST:
+    if len(files) >= DEEPEST:
         raise ValueError(f"its elements or included files are nested more than {DEEPEST} deep")
     check_size(text)
-    return parsed(text)
+    return [*files, path], parsed(text)
 
 
 LEFT_OUT = "geoms of these kinds are left out"
@@ -97,7 +94,8 @@ MESH = 7
 _GIVEN = ("compiler", "default", "asset", "worldbody", "keyframe", "equality", "tendon")
 _ATTRIBUTES = {
     "compiler": {"angle", "autolimits", "coordinate", "eulerseq", "boundmass", "boundinertia"},
-    "mesh": {"name", "class", "scale", "refpos", "refquat", "inertia", "vertex", "face"},
+    "mesh": {"name", "class", "file", "scale", "refpos", "refquat", "inertia", "vertex", "face"},
+    "model": {"name", "file"},
     "material": {"name", "class", "rgba"},
     "key": {"name", "qpos"},  # of actuators and speeds nothing is read
 }
@@ -105,9 +103,9 @@ _ATTRIBUTES["compiler"] |= {"settotalmass", "balanceinertia", "inertiafromgeom"}
 _ATTRIBUTES["compiler"] |= {"inertiagrouprange"}
 _DROPPED = ("camera", "light")
 # What makes bodies of its own, without end, or runs a plugin.
-_UNKNOWN = ("composite", "flexcomp", "replicate", "deformable", "flex", "plugin")
+_UNKNOWN = ("composite", "flexcomp", "deformable", "flex", "plugin")
 _MOST_MESH = 1e9  # [B]
-_POINT = "0 0 0 1 0 0 0 1 0 0 0 1"  # a mesh that nothing weighs
+_POINT = [0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1]  # a mesh that nothing weighs
 _HULLS = "masses of meshes that are not closed are those of their convex hulls"
 
 
@@ -132,13 +130,17 @@ class Compiled:
     """
 
     def __init__(self, mujoco: Any, root: ET.Element, folders: Folders, floats: bool | None):
-        self.mujoco, self.folders = mujoco, folders
+        self.mujoco = mujoco
         # What is not modeled: the names that each sentence is about.
         self.notes: defaultdict[str, list[str]] = defaultdict(list)
         self.files: dict[str, tuple[Path, Array]] = {}
-        self._links, self._attached = 0, itertools.count()
+        models: dict[str, bytes] = {}
         with silent(mujoco):
-            spec = self._spec(root)
+            spec = mujoco.MjSpec.from_string(self._given(root, models)[0], include=models)
+            for mesh in spec.meshes:
+                if mesh.file:
+                    self.files[mesh.name] = folders.beside(mesh.file), mesh.scale.copy()
+                    mesh.file, mesh.uservert = "", _POINT
             freedoms = {FREE: 6, BALL: 3}
             check_memory(sum(freedoms.get(int(joint.type), 1) for joint in spec.joints))
             if len(spec.bodies) < 2:
@@ -149,82 +151,49 @@ class Compiled:
             self._weigh(spec)
             self.model = spec.compile()
 
-    def _spec(self, given: ET.Element, prefix: str = "") -> Any:
-        """Return what MuJoCo reads of a model: nothing that names a file; models are attached."""
-        models = {one.get("name"): one for one in given.iterfind("asset/model")}
-        root = ET.Element("mujoco", model="robot")
-        for one in given:
-            # Of a model that is attached no keys: it has not all joints.
-            if one.tag in _GIVEN and not (prefix and one.tag == "keyframe"):
-                root.append(copy.deepcopy(one))
+    def _given(
+        self, stated: ET.Element, models: dict[str, bytes], *, whole: bool = True
+    ) -> tuple[str, int]:
+        """Return what MuJoCo reads of a model, and how many bodies and attached models it has.
+
+        It names no file but those of meshes, which MuJoCo does not read, and of the models that it
+        attaches, which are put into `models`. Of one that is attached, not `whole`, no keys: it has
+        not all joints.
+        """
+        root = ET.Element("mujoco", model=stated.get("model", "robot"))
+        given = [tag for tag in _GIVEN if whole or tag != "keyframe"]
+        root[:] = [copy.deepcopy(one) for one in stated if one.tag in given]
         for tag in _UNKNOWN:  # plugins of actuators and sensors are not read
-            if any(given.find(path + tag) is not None for path in ("", "worldbody//", "asset//")):
+            if any(stated.find(path + tag) is not None for path in ("", "worldbody//", "asset//")):
                 raise ValueError(
                     f"<{tag}> is not supported: let MuJoCo write the bodies out "
                     "(mujoco.MjSpec.from_file(...), compile(), to_xml())"
                 )
-        self._links += sum(1 for _ in root.iterfind("worldbody//body"))
-        if self._links > MOST_LINKS:
-            raise ValueError(f"it has {self._links} links; at most {MOST_LINKS} can be read")
-        self._drop_files(root, prefix)
-        attached = []
-        for one in list(root.iter("attach")):
-            frame, stated = f"attached {next(self._attached)}", dict(one.attrib)
-            attached.append((frame, stated))
-            one.tag, one.attrib = "frame", {"name": frame}
-        spec = self.mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
-        for frame, stated in attached:
-            self._attach(spec, spec.frame(frame), stated, models, prefix)
-        return spec
-
-    def _attach(
-        self,
-        spec: Any,
-        frame: Any,
-        stated: Mapping[str, str],
-        models: Mapping[str | None, ET.Element],
-        prefix: str,
-    ) -> None:
-        """Put a model that <attach> names, or one body of it, into a frame."""
-        name, own, body = (stated.get(key, "") for key in ("model", "prefix", "body"))
-        inside = models[name].find("mujoco") if name in models else None
-        if inside is None:
-            raise ValueError(f"it attaches the model '{name}', which no <asset> names")
-        if next(self._attached) > 2 * MOST_FILES:
-            raise ValueError(f"it attaches more than {MOST_FILES} models")
-        child = self._spec(inside, f"{prefix}{own}")
-        if not body:
-            spec.attach(child, prefix=own, frame=frame)
-        elif child.body(body) is None:
-            raise ValueError(f"it attaches the body '{body}', which the model '{name}' has not")
-        else:
-            frame.attach_body(child.body(body), own, "")
-
-    def _drop_files(self, root: ET.Element, prefix: str) -> None:
-        """Take out of a model what names files; stand-ins that weigh nothing are its meshes."""
-        compiler = {k: v for one in root.findall("compiler") for k, v in one.attrib.items()}
-        for mesh in root.iterfind("asset/mesh[@file]"):
-            if "refpos" in mesh.attrib or "refquat" in mesh.attrib:
-                file = mesh.get("file")
-                raise ValueError(f"mesh {file} states refpos or refquat: move its geoms instead")
-            path = Path(mesh.attrib["file"])
-            path = Path(path.name) if compiler.get("strippath") == "true" else path
-            name = mesh.attrib.setdefault("name", path.stem)
-            path = Path(compiler.get("meshdir", compiler.get("assetdir", ""))) / path
-            self.files[prefix + name] = self.folders.beside(str(path)), np.ones(3)
-            mesh.set("vertex", _POINT)
+        inside = dict[str | None, int]()
+        for one in root.iterfind("asset/model"):
+            name = one.get("name", one[0].get("model"))
+            text, inside[name] = self._given(one[0], models, whole=False)
+            one.set("file", f"{len(models)}.xml")
+            models[one.attrib["file"]] = text.encode()
+        links = sum(_links(one, inside) for one in root.iterfind("worldbody"))
+        if links > MOST_LINKS:
+            raise ValueError(f"it has {links} links; at most {MOST_LINKS} can be read")
         for element in root.iter():
             for one in list(element):
                 if "hfield" in one.attrib:  # of a file
                     self.notes[LEFT_OUT].append("hfield")
-                unread = element.tag == "asset" and one.tag not in ("mesh", "material")
+                unread = element.tag == "asset" and one.tag not in _ATTRIBUTES
                 if unread or one.tag in _DROPPED or "hfield" in one.attrib:
                     element.remove(one)
+            file = element.get("file")
+            if element.tag == "mesh" and file and {"refpos", "refquat"} & element.attrib.keys():
+                raise ValueError(f"mesh {file} states refpos or refquat: move its geoms instead")
             if kept := _ATTRIBUTES.get(element.tag):
                 element.attrib = {k: v for k, v in element.attrib.items() if k in kept}
                 element[:] = []
             if element.tag == "freejoint":
                 element.attrib.pop("align", None)
+        return ET.tostring(root, encoding="unicode"), links
 
     def _weigh(self, spec: Any) -> None:
         """Read meshes where something weighs what they hold."""
@@ -273,6 +242,17 @@ class Compiled:
                 f"the mass of body '{body}' would be that of mesh '{mesh.name}', which cannot be "
                 f"read ({reason}): state <inertial>"
             ) from None
+
+
+def _links(element: ET.Element, inside: Mapping[str | None, int], *, copied: bool = False) -> int:
+    """Return the number of bodies and models in `element`, and of all that it has copies of."""
+    copies = element.tag == "replicate"
+    count = int(copied or element.tag in ("body", "attach"))
+    count += inside.get(element.get("model"), 0) if element.tag == "attach" else 0
+    count += sum(_links(one, inside, copied=copied or copies) for one in element)
+    # What is no number MuJoCo refuses.
+    times = re.match(r"\s*[-+]?(\d+)", element.get("count", "")) if copies else None
+    return count * (int(times[1]) if times else 1)
 
 
 def _name_all(spec: Any) -> None:

@@ -49,8 +49,7 @@ class InvalidParameter(SphshellError, ValueError):
         `given` replaces "= value" in the text.
         """
         super().__init__(f"{name} {f'= {_shown(value)}' if given is None else given} {must}")
-        self.name = name
-        self.value = value
+        self.name, self.value = name, value
 
 
 class UnitMissing(InvalidParameter):
@@ -61,9 +60,7 @@ class UnitMissing(InvalidParameter):
 
     def __init__(self, path: str | PathLike[str], size: float, units: Iterable[str]) -> None:
         """Say that the unit of the file at `path` must be stated as one of `units`."""
-        self.path = Path(path)
-        self.size = size
-        self.units = tuple(units)
+        self.path, self.size, self.units = Path(path), size, tuple(units)
         super().__init__("unit", None, self.must("unit='{}'"))
 
     def must(self, option: str) -> str:
@@ -116,16 +113,17 @@ class InvalidShell(SphshellError, ValueError):
     """Vertices or elements from which no surface can be made."""
 
 
-class ShellFileError(SphshellError, ValueError):
-    """A surface file that cannot be read: `path`, and `line` (1-based) where it is known."""
+class _OfFile(SphshellError):
+    """What is wrong with the file or folder at `path`: `reason`, and `line` (1-based) if known."""
 
     def __init__(self, path: str | PathLike[str], reason: str, line: int | None = None) -> None:
         """Say what is wrong with the file at `path`."""
-        where = f"{path}, line {line}" if line is not None else f"{path}"
-        super().__init__(f"{where}: {reason}")
-        self.path = path
-        self.reason = reason
-        self.line = line
+        super().__init__(f"{path}{'' if line is None else f', line {line}'}: {reason}")
+        self.path, self.reason, self.line = path, reason, line
+
+
+class ShellFileError(_OfFile, ValueError):
+    """A surface file that cannot be read."""
 
 
 class NameNotFound(SphshellError, LookupError):
@@ -138,9 +136,7 @@ class NameNotFound(SphshellError, LookupError):
 
         Of a long list the message has the nearest names; `see` is where to find the others.
         """
-        self.kind = kind
-        self.name = name
-        self.valid = tuple(valid)
+        self.kind, self.name, self.valid = kind, name, tuple(valid)
         hint = did_you_mean(name, self.valid)
         has = f"{owner} has: {', '.join(self.valid) or 'none'}{hint and f'; {hint}'}"
         if len(self.valid) > _MOST_NAMES:
@@ -166,8 +162,7 @@ class MissingExtra(SphshellError, ImportError):
         super().__init__(
             f"{purpose} needs {package}: install it with pip install 'sphshell-pin[{extra}]'"
         )
-        self.package = package
-        self.extra = extra
+        self.package, self.extra = package, extra
 
 
 def import_extra(module: str, extra: str, purpose: str, package: str = "") -> ModuleType:
@@ -190,9 +185,7 @@ class UnusableExtra(MissingExtra):
             f"{purpose} needs {package}, which is installed but cannot be loaded: {why}; on Debian "
             f"or Ubuntu, apt-get install {debian}"
         )
-        self.package = package
-        self.extra = extra
-        self.reason = reason
+        self.package, self.extra, self.reason = package, extra, reason
 
 
 class DeepStart(SphshellError, ValueError):
@@ -207,9 +200,7 @@ class DeepStart(SphshellError, ValueError):
             f"contact '{pair}' starts at depth {depth:.6g} m, more than half of its sphere's "
             f"radius {radius:.6g} m: move the start configuration, or turn the shell's side"
         )
-        self.pair = pair
-        self.depth = depth
-        self.radius = radius
+        self.pair, self.depth, self.radius = pair, depth, radius
 
 
 class ScenarioError(SphshellError, ValueError):
@@ -221,28 +212,15 @@ class ScenarioError(SphshellError, ValueError):
         """Say which `key` of the scenario at `path` is wrong and why."""
         given = f" (given: {value!r})" if value is not None else ""
         super().__init__(f"{path}: {key}: {reason}{given}" if key else f"{path}: {reason}{given}")
-        self.path = path
-        self.key = key
-        self.value = value
+        self.path, self.key, self.value = path, key, value
 
 
-class ResultError(SphshellError, OSError):
-    """Results that cannot be written or read back: `path`."""
-
-    def __init__(self, path: str | PathLike[str], reason: str) -> None:
-        """Say what is wrong with the results at `path`."""
-        super().__init__(f"{path}: {reason}")
-        self.path = path
+class ResultError(_OfFile, OSError):
+    """Results that cannot be written or read back."""
 
 
-class DataError(SphshellError, ValueError):
-    """Measured data that no run can be fitted to: `source`, and `line` (1-based) of a file."""
-
-    def __init__(self, source: str, reason: str, line: int | None = None) -> None:
-        """Say what is wrong with the data of `source`, and in which `line`."""
-        super().__init__(f"{source}{'' if line is None else f', line {line}'}: {reason}")
-        self.source = source
-        self.line = line
+class DataError(_OfFile, ValueError):
+    """Measured data, of a file or of what is called `path`, that no run can be fitted to."""
 
 
 class _Stopped(SphshellError):
@@ -251,8 +229,7 @@ class _Stopped(SphshellError):
     def __init__(self, t: float, why: str, result: Result) -> None:
         """Say when and why the run had to stop."""
         super().__init__(self._text.format(t=t, why=why))
-        self.t = t
-        self.result = result
+        self.t, self.result = t, result
 
     _text = "interrupted at t = {t:.6g} s"
 
@@ -311,8 +288,7 @@ class Busy(SphshellError, RuntimeError):
             why = f"thread '{names[0] if names else thread}' is in its {doing}(): wait until that "
             why += "has returned, or make one for each thread"
         super().__init__(f"this {what} is busy: {why}")
-        self.what = what
-        self.doing = doing
+        self.what, self.doing = what, doing
 
 
 class SweepError(SphshellError, RuntimeError):

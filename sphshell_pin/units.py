@@ -20,27 +20,16 @@ METERS_PER_UNIT: dict[str, float] = {
 }
 """Meters in one unit of length."""
 
-_ALIASES: dict[str, str] = {
-    "meter": "m",
-    "metre": "m",
-    "meters": "m",
-    "metres": "m",
-    "millimeter": "mm",
-    "millimetre": "mm",
-    "millimeters": "mm",
-    "millimetres": "mm",
-    "centimeter": "cm",
-    "centimetre": "cm",
-    "micrometer": "um",
-    "micrometre": "um",
-    "micron": "um",
-    "µm": "um",
-    "inch": "in",
-    "inches": "in",
-    "foot": "ft",
-    "feet": "ft",
-    "yard": "yd",
+_SPELLINGS = {
+    "m": "meter metre meters metres",
+    "mm": "millimeter millimetre millimeters millimetres",
+    "cm": "centimeter centimetre",
+    "um": "micrometer micrometre micron µm",
+    "in": "inch inches",
+    "ft": "foot feet",
+    "yd": "yard",
 }
+_ALIASES = {one: unit for unit, names in _SPELLINGS.items() for one in names.split()}
 
 ADAMS_UNITS: dict[str, tuple[float, float]] = {
     "mm-N-s": (1e-3, 1.0),
@@ -70,11 +59,6 @@ def meters_per_unit(unit: str) -> float:
     raise InvalidParameter("unit", unit, f"must be one of: {', '.join(METERS_PER_UNIT)}")
 
 
-def length_to_meters(value: float, unit: str) -> float:
-    """Convert a length from `unit` to meters."""
-    return value * meters_per_unit(unit)
-
-
 def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
     """ADAMS stiffness K [force/length^exponent] in [N/m^exponent].
 
@@ -83,12 +67,6 @@ def adams_stiffness_to_si(stiffness: float, exponent: float, units: str = "mm-N-
     """
     length, force = adams_units(units)
     return float(stiffness * force / length**exponent)
-
-
-def adams_stiffness_from_si(stiffness: float, exponent: float, units: str = "mm-N-s") -> float:
-    """Stiffness [N/m^exponent] as ADAMS writes it; the inverse of `adams_stiffness_to_si`."""
-    length, force = adams_units(units)
-    return float(stiffness * length**exponent / force)
 
 
 def adams_damping_to_si(damping: float, units: str = "mm-N-s") -> float:

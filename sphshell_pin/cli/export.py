@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,22 +47,16 @@ def export(
         if to == "rrd":
             must += "; Rerun's viewer opens .mcap files"
         raise InvalidParameter("--to", to, must)
-    words = ["export", str(run), "--to", to]
-    words += [] if out is None else ["--out", str(out)]
-    words += [] if of is None else ["--scenario", of]
-    command = shlex.join(["sphshell-pin", *words])
     if to == "mcap":
         from sphshell_pin.export.mcap import write_mcap
 
-        replay, place = Replay(file_of(run), of), out or beside(run, ".mcap")
-        made = write_mcap(place, replay.result, replay.scene, command=command)
-        files = [made]
+        replay = Replay(file_of(run), of)
+        files = [write_mcap(out or beside(run, ".mcap"), replay.result, replay.scene)]
     else:
         from sphshell_pin.export.tables import write_tables
 
-        result, scene = with_scene(run, of)
         place = out or beside(run, f"_{to}")
-        files = write_tables(place, result, scene, format=to, command=command)  # type: ignore[arg-type]
+        files = write_tables(place, *with_scene(run, of), format=to)  # type: ignore[arg-type]
     for file in files:
         common.echo(file)
 

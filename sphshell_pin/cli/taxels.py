@@ -6,6 +6,9 @@ from pathlib import Path
 from sphshell_pin.cli.common import RunArgument, command, echo, if_installed
 from sphshell_pin.cli.export import file_of
 
+SHOWN = 5
+"""Rows in the picture."""
+
 
 @command()
 def taxels(
@@ -16,10 +19,9 @@ def taxels(
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
     up: tuple[float, float, float] | None = None,
     extent_deg: tuple[float, float] = (90.0, 90.0),
-    speed: float = 1.0,
     out: Path | None = None,
 ) -> None:
-    """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a film of it.
+    """Write what a grid of tactile sensors on a sphere felt: taxels.npz, and a picture.
 
     The run must have recorded patches (record in its table run).
 
@@ -32,11 +34,11 @@ def taxels(
     axis : From the sphere's center to the middle of the grid, in its frame.
     up : Direction of the columns, in the same frame; by default any.
     extent_deg : Angles over which rows and columns reach.
-    speed : Simulated seconds in a second of the film.
     out : Folder to write into; by default that of the run.
     """
     from sphshell_pin.patches import TaxelGrid
-    from sphshell_pin.plot.taxels import save_film
+    from sphshell_pin.plot.figure import write_figure
+    from sphshell_pin.plot.taxels import plot_taxels
     from sphshell_pin.scenario.running.replay import Replay
 
     height, width = map(math.radians, extent_deg)
@@ -48,6 +50,7 @@ def taxels(
     folder.mkdir(parents=True, exist_ok=True)
     echo(images.save(folder / "taxels.npz"))
     with if_installed():
-        echo(save_film(folder / "taxels.gif", images, speed=speed))
+        rows = [k * (len(images.t) - 1) // (SHOWN - 1) for k in range(SHOWN)]
+        echo(write_figure(folder / "taxels.png", plot_taxels(images, rows)))
     felt, missed = float(images.forces.max()), float(abs(images.outside).max())
     echo(f"most on a taxel: {felt:.4g} N; beside the grid: {missed:.4g} N at most")

@@ -78,7 +78,7 @@ def _play(file: Path, of: str | None, speed: float | None, color: str, *, open_:
         replay.visual_model,
         title=replay.title,
         speed=replay.speed if speed is None else speed,
-        color=color,  # type: ignore[arg-type]
+        color=color,
     )
     common.echo(path)
     if open_:

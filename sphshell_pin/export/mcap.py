@@ -4,6 +4,7 @@ import heapq
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 
@@ -48,37 +49,32 @@ def write_mcap(
     scene: Scene | None = None,
     *,
     start: int = 0,
-    command: str = "",
 ) -> Path:
-    """Write `result` as an MCAP file; see `Result.to_mcap`. `command` goes into its metadata."""
+    """Write `result` as an MCAP file; see `Result.to_mcap`."""
     mcap = import_extra("mcap_ros2.writer", "mcap", "Result.to_mcap", "mcap-ros2-support")
     scene = scene_of(result, scene)
     check_scene(result, scene, "the result")
     check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
     run, path = _Run(result, scene, start), Path(path)
     origin = result.origin
-    about = {"version": sphshell_pin.__version__, "start [ns]": str(start), "command": command}
-    about["scenario"] = "" if origin is None else origin.scenario
+    about = {"version": sphshell_pin.__version__, "start [ns]": str(start)}
+    about |= {} if origin is None else {"scenario": origin.scenario}
     about |= {f"contact {name}": topic for name, topic in run.topics.items()}
     try:
         with atomic_file(path) as stream, mcap.Writer(stream) as writer:
-            writer.add_metadata(
-                "sphshell_pin", {name: text for name, text in about.items() if text}
-            )
+            writer.add_metadata("sphshell_pin", about)
             if origin is not None:
                 data = json.dumps(origin.settings, indent=1).encode()
                 writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
-            schemas = {}
-            for time, topic, kind, message in run.static():
-                schemas[kind] = writer.register_msgdef(full_name(kind), schema_of(kind))
-                # A channel has metadata only if it is registered by MCAP's own writer.
-                writer._channel_ids[topic] = writer._writer.register_channel(
-                    topic, "cdr", schemas[kind].id, {"offered_qos_profiles": _LATCHED}
-                )
-                writer.write_message(topic, schemas[kind], message, time, time)
-            for time, topic, kind, message in run.messages():
+            schemas, static = {}, list(run.static())
+            for k, (time, topic, kind, message) in enumerate(chain(static, run.messages())):
                 if kind not in schemas:
                     schemas[kind] = writer.register_msgdef(full_name(kind), schema_of(kind))
+                if k < len(static):
+                    # A channel has metadata only if it is registered by MCAP's own writer.
+                    writer._channel_ids[topic] = writer._writer.register_channel(
+                        topic, "cdr", schemas[kind].id, {"offered_qos_profiles": _LATCHED}
+                    )
                 writer.write_message(topic, schemas[kind], message, time, time)
     except OSError as error:
         raise ResultError(path, f"cannot be written: {error.strerror or error}") from error

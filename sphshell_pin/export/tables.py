@@ -1,7 +1,6 @@
 """A result as a folder of tables: rows, contacts, events, energy and sensors."""
 
 import io
-import json
 from os import PathLike
 from pathlib import Path
 from typing import Literal
@@ -34,12 +33,11 @@ def write_tables(
     scene: Scene | None = None,
     *,
     format: Format = "csv",
-    command: str = "",
 ) -> list[Path]:
     """Write the tables of `result` into `folder`, all or none; return the paths of the files.
 
-    Numbers are read back exactly from both formats. A .parquet file also says, in its metadata,
-    which scenario ran and which `command` wrote it. Tables of an earlier call are replaced.
+    Numbers are read back exactly from both formats. The metadata of a .parquet file say which
+    scenario ran. Tables of an earlier call are replaced.
 
     Raises
     ------
@@ -53,10 +51,9 @@ def write_tables(
         data = {f"{name}.csv": csv_text(table).encode() for name, table in tables.items()}
     else:
         scenario = "" if result.origin is None else result.origin.scenario
-        about = {"scenario": scenario, "command": command}
         data = {}
         for name, table in tables.items():
             stream = io.BytesIO()
-            write_parquet(stream, table, {"sphshell_pin": json.dumps(about)})
+            write_parquet(stream, table, {"scenario": scenario})
             data[f"{name}.parquet"] = stream.getvalue()
     return write_folder(folder, data, [f"{name}.{format}" for name in KINDS])

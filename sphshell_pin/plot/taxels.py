@@ -1,30 +1,22 @@
-"""Tactile images: some rows side by side, and films."""
+"""Tactile images: some rows side by side."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array, Bytes
-from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.checks import check_positive
-from sphshell_pin.errors import InvalidParameter, import_extra
+from sphshell_pin.base.arrays import Array
+from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from matplotlib.figure import Figure
 
     from sphshell_pin.patches.taxels import TaxelImages
 
 COLORS = "inferno"
-LARGE = 320  # pixels of a film's longer side, at least
-MOST_FRAMES = 100_000
 
 
 def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
@@ -51,33 +43,6 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
     return figure
 
 
-def save_film(
-    path: str | PathLike[str], images: TaxelImages, *, fps: float = 30, speed: float = 1.0
-) -> Path:
-    """Write a film of a grid's images at `path`, a .gif.
-
-    `fps` frames a second, of which each shows `speed` / `fps` seconds of simulated time.
-
-    Raises InvalidParameter unless the images are those of a grid, and for an `fps` or `speed` that
-    is not positive or makes more than MOST_FRAMES; MissingExtra without matplotlib, ResultError
-    where the file cannot be written.
-    """
-    if Path(path).suffix.lower() != ".gif":
-        raise InvalidParameter("path", str(path), "must end in .gif")
-    fps, speed = check_positive("fps", fps), check_positive("speed", speed)
-    image = import_extra("PIL.Image", "view", "a film of taxels", "pillow")
-    frames = _frames(images, fps, speed)
-    times = -(-LARGE // max(frames.shape[1:3]))
-    first, *others = (
-        image.fromarray(np.asarray(one.repeat(times, axis=0).repeat(times, axis=1)))
-        for one in frames
-    )
-    stream, duration = io.BytesIO(), 1000 / fps
-    more = {"save_all": True, "append_images": others, "duration": duration, "loop": 0}
-    first.save(stream, "gif", **more)
-    return write_whole(path, stream.getvalue())
-
-
 def _grid(images: TaxelImages) -> Array:
     if images.forces.ndim != 3:
         raise InvalidParameter(
@@ -87,19 +52,3 @@ def _grid(images: TaxelImages) -> Array:
             given="of shape",
         )
     return images.forces
-
-
-def _frames(images: TaxelImages, fps: float, speed: float) -> Bytes:
-    """Return colors (frames, rows, columns, 3) of the taxels, latitude up."""
-    forces = _grid(images)
-    matplotlib = import_extra("matplotlib", "view", "a film of taxels")
-    with np.errstate(over="ignore", invalid="ignore"):  # of times that no run has
-        count = np.divide(images.t[-1] - images.t[0] + 1e-9, speed / fps)
-    if not 0.0 <= count < MOST_FRAMES:
-        why = f"gives {count:.2g} frames, of 1 to {MOST_FRAMES}, at {fps:g} frames a second"
-        raise InvalidParameter("speed", speed, why)
-    wanted = images.t[0] + np.arange(int(count) + 1) * (speed / fps)
-    rows = np.minimum(np.searchsorted(images.t, wanted), len(images.t) - 1)
-    share = forces[rows][:, ::-1] / (forces.max() or 1.0)
-    colors = matplotlib.colormaps[COLORS](np.maximum(share, 0.0))[..., :3] * 255.0
-    return np.asarray(colors, np.uint8)

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, TypedDict, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -43,21 +43,6 @@ FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu
 LAID_OUT = 1280 * 720  # pixels of the area for which text has its usual size
 LEAST_SIZE, MOST_SIZE = 64, 7680  # pixels
 PATIENCE = 120_000.0  # [ms] until the page is loaded
-
-
-class FilmOptions(TypedDict, total=False):
-    """The options of `render_film`."""
-
-    time: float | None
-    span: tuple[float | None, float | None]
-    size: tuple[int, int]
-    fps: float
-    speed: float | None
-    camera: Camera
-    chart: bool
-    dark: bool
-    title: str | None
-    told: Callable[[int, int], object]
 
 
 def render_film(

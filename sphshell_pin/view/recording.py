@@ -6,7 +6,7 @@ import html
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TypedDict, Unpack
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -41,14 +41,6 @@ MOST_PIECES = 80  # of a trail
 MOST_FRAMES = 1_000_000
 
 
-class RecordingOptions(TypedDict, total=False):
-    """Options of `render_recording` that `write_recording` takes, too."""
-
-    fps: float
-    speed: float
-    color: Coloring
-
-
 def write_recording(
     path: str | PathLike[str],
     result: Result,
@@ -56,7 +48,7 @@ def write_recording(
     visual_model: pin.GeometryModel | None = None,
     *,
     title: str | None = None,
-    **options: Unpack[RecordingOptions],
+    **options: Any,
 ) -> Path:
     """Write `result` as one self-contained HTML file at `path`, and return the path.
 

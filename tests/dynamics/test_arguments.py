@@ -262,9 +262,6 @@ def test_geometry_stays_on_its_joint_whatever_the_frames_are_called() -> None:
     assert made.placement_i.isApprox(place)
 
 
-def test_a_law_that_nobody_states_is_warned_of() -> None:
-    scene = Scene(ball())
-    with pytest.warns(FutureWarning, match=r"law=ImpactLaw\.from_adams") as caught:
-        pair = scene.add_contact(BALL, plate())
-    assert caught[0].filename == __file__
-    assert pair.law == sp.ImpactLaw.from_adams()
+def test_a_contact_needs_a_law() -> None:
+    with pytest.raises(InvalidParameter, match="law = None must be a law of this package"):
+        Scene(ball()).add_contact(BALL, plate())

@@ -235,10 +235,9 @@ def test_the_file_says_where_it_comes_from(finger, tmp_path):
     settings = {"run": {"dt": 1e-4}, "sensor": [{"name": "fingertip", "frame": "tip"}]}
     origin = Origin("some/finger.toml", settings)
     path = tmp_path / "finger.mcap"
-    exporting.write_mcap(path, replace(result, origin=origin), command="sphshell-pin export x")
+    exporting.write_mcap(path, replace(result, origin=origin))
     read = Read(path)
     assert read.metadata["sphshell_pin"]["scenario"] == "some/finger.toml"
-    assert read.metadata["sphshell_pin"]["command"] == "sphshell-pin export x"
     assert json.loads(read.attachments["settings.json"]) == settings
 
 

@@ -1,6 +1,5 @@
 """Tables of a run: every number is read back exactly, columns have their units."""
 
-import json
 import sys
 
 import numpy as np
@@ -140,10 +139,9 @@ def test_names_of_columns_and_text():
 
 
 def test_a_parquet_file_says_where_it_comes_from(finger, tmp_path):
-    write_tables(tmp_path / "out", finger, format="parquet", command="sphshell-pin export x")
+    write_tables(tmp_path / "out", finger, format="parquet")
     schema = pyarrow.parquet.read_schema(tmp_path / "out" / "rows.parquet")
-    about = json.loads(schema.metadata[b"sphshell_pin"])
-    assert about == {"scenario": "", "command": "sphshell-pin export x"}
+    assert schema.metadata[b"scenario"] == b""
 
 
 def test_tables_of_an_earlier_call_go_and_other_files_stay(finger, table, tmp_path):

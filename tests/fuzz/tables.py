@@ -79,7 +79,7 @@ def npz_corpus() -> tuple[bytes, ...]:
         shapes |= {"normal_force": (m,), "depth": (m,)}
         rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
         by = Sensitivities(("v0.0", "v0.1"), **rows)
-        result = replace(result, sensitivity_rows=by)
+        result = replace(result, sensitivities=by)
         return (reproducible(result.save(Path(home, "run.npz"))),)
 
 

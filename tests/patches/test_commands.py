@@ -26,7 +26,7 @@ def test_a_scenario_writes_patches_and_taxels(tmp_path):
         # A loaded result finds the scene of its scenario.
         grid = sp.TaxelGrid("ball-plate", (4, 6), axis=(0, 0, -1))
         np.testing.assert_array_equal(grid.images(result).forces, file["forces"])
-    assert (out / "taxels.gif").is_file()
+    assert (out / "taxels.png").is_file()
 
 
 def test_a_run_without_patches_has_no_taxels(tmp_path, no_pictures):

@@ -1,7 +1,5 @@
 """Taxels: sums are exact, shares are those of Hertz's pressure, images move with the body."""
 
-import dataclasses
-
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,8 +7,6 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches import ShellTaxels, TaxelGrid
-from sphshell_pin.plot.taxels import save_film
-from sphshell_pin.results import TaxelImages
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider, total_force
 
 DOWN = (0.0, 0.0, -1.0)
@@ -117,22 +113,6 @@ def test_what_lies_beyond_a_border_is_outside():
     result = slide(shell, duration=1e-4)
     images = ShellTaxels("tip").images(result)
     assert images.outside[0] == pytest.approx(0.5 * total_force(result)[0], rel=1e-6)
-
-
-def test_films(tmp_path):
-    image = pytest.importorskip("PIL.Image")
-    t = np.linspace(0.0, 0.05, 51)
-    images = TaxelImages(t, np.random.default_rng(0).random((51, 4, 6)), np.zeros(51))
-    film = save_film(tmp_path / "taxels.gif", images, fps=20, speed=0.1)
-    with image.open(film) as opened:
-        assert opened.n_frames == 11
-        assert opened.width * 4 == opened.height * 6
-    with pytest.raises(InvalidParameter, match=r"must end in \.gif"):
-        save_film(tmp_path / "taxels.avi", images)
-    for t, speed in ((-1e308, 1.0), (np.nan, 1.0), (0.0, 1e-300)):
-        odd = dataclasses.replace(images, t=np.concatenate([[t], images.t[1:]]))
-        with pytest.raises(InvalidParameter, match=r"speed = .* frames, of 1 to 100000"):
-            save_film(tmp_path / "taxels.gif", odd, speed=speed)
 
 
 def test_mistakes(slid):

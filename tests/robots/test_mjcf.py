@@ -211,7 +211,8 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, word
 @pytest.mark.parametrize(
     ("inside", "head", "words"),
     [
-        ("<replicate count='2'/>", "", "<replicate> is not supported"),
+        ("<composite/>", "", "<composite> is not supported"),
+        (f"<replicate count='{10**9}'><geom size='1'/></replicate>", "", "has 1000000000 links"),
         (f"{ARM}<geom size='1'><plugin plugin='p'/></geom>", "", "<plugin> is not supported"),
         (ARM, "<compiler coordinate='global'/>", "coordinate"),
         (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
@@ -362,19 +363,21 @@ def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
 def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
     """Their defaults and units stay theirs, and those of two copies apart."""
     (tmp_path / "link.xml").write_text(
-        '<mujoco><compiler angle="radian"/><default><geom density="500"/><default class="heavy">'
-        '<geom density="4000"/></default></default><worldbody>'
+        '<mujoco model="link"><compiler angle="radian"/><default><geom density="500"/>'
+        '<default class="heavy"><geom density="4000"/></default></default><worldbody>'
         '<body name="b" pos="0 0 .1" euler="0 0.3 0"><joint name="j" axis="0 1 0"/>'
         '<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/><body pos="0 0 .3">'
-        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body></worldbody>'
-        "</mujoco>"
+        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body>'
+        '<frame name="f" pos="1 0 0"><body><joint name="n"/><geom size=".1"/></body></frame>'
+        "</worldbody></mujoco>"
     )
     file = tmp_path / "two.xml"
     file.write_text(
         '<mujoco><default><default class="heavy"><geom density="9"/></default></default><asset>'
-        '<model name="link" file="link.xml"/></asset><worldbody><body name="c"><joint name="base" '
+        '<model file="link.xml"/></asset><worldbody><body name="c"><joint name="base" '
         'type="slide"/><geom size=".1"/><attach model="link" prefix="l_"/><frame pos="0 .2 0">'
-        '<attach model="link" body="b" prefix="r_"/></frame></body></worldbody></mujoco>'
+        '<attach model="link" body="b" prefix="r_"/></frame><attach model="link" frame="f" '
+        'prefix="f_"/></body></worldbody></mujoco>'
     )
     mujoco = pytest.importorskip("mujoco")
     theirs = mujoco.MjModel.from_xml_path(str(file))

@@ -110,7 +110,7 @@ def test_wrong_data_get_a_sentence(read, case):
     with pytest.raises(DataError, match=said) as caught:
         read(text)
     assert str(caught.value).count("\n") == 0
-    assert str(caught.value).startswith(caught.value.source)
+    assert str(caught.value).startswith(str(caught.value.path))
 
 
 @pytest.mark.parametrize(

@@ -63,7 +63,7 @@ def test_a_shell_shared_by_many_spheres_is_drawn_once():
 
 def test_a_pair_without_sphere_or_shell_shows_its_contacts():
     scene = Scene(ball_model())
-    scene.add_contact_source(lambda *_: ([], [], []), "ball", "table", name="gears")
+    scene.add_contact_source(lambda *_: ([], [], []), "ball", "table", ImpactLaw(1e5), name="gears")
     contacts = contact_log([{"point_world": [0.1, 0.2, 0.3], "normal_force": 7.0}])
     where, _ = filmed(scene, ball_configuration(np.zeros(3)), contacts)
     np.testing.assert_allclose(where["contacts/point_0"][:3, 3], [0.1, 0.2, 0.3])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from sphshell_pin.dynamics.run.sensitivities import Sensitivities
     from sphshell_pin.dynamics.sensing.sensors import SensorSet
-    from sphshell_pin.view.film import FilmOptions
     from sphshell_pin.view.recording import RecordingView
 
 
@@ -45,8 +44,10 @@ class Result(Summarized):
     its cost, and figures of each pair over all steps; `scene` that ran
     (None after load); `origin` the scenario it came from (None without one); `sensors` the readings
     of each sensor by its name; `patch_rows` the patches of the contacts, None where they were not
-    recorded (see `patches`); `torque` (n, nv) the controller's torques, cut to their limits [N m or
-    N], None unless the run recorded them: nan where a torque that is held was not known yet;
+    recorded (see `patches`); `sensitivities` how the rows change with parameters and the start,
+    None where this was not asked for; `torque` (n, nv) the controller's torques, cut to their
+    limits [N m or N], None unless the run recorded them: nan where a torque that is held was not
+    known yet;
     `states` what the run can go on from at each row (see `at`), None unless they were recorded.
     """
 
@@ -62,7 +63,7 @@ class Result(Summarized):
     origin: result_parts.Origin | None = None
     sensors: Mapping[str, SensorLog] = field(default_factory=dict)
     patch_rows: result_parts.Patches | None = None
-    sensitivity_rows: Sensitivities | None = None
+    sensitivities: Sensitivities | None = None
     torque: Array | None = None
     states: tuple[Array, ...] | None = None
 
@@ -93,11 +94,6 @@ class Result(Summarized):
             Fact("peak force", max((one.peak_force for one in pairs), default=0.0), "N"),
             Fact("energy residual", float(self.energy.residual[-1]) if len(self.t) else 0.0, "J"),
         ]
-
-    @property
-    def sensitivities(self) -> Sensitivities | None:
-        """How the rows change with parameters and the start; None where this was not asked for."""
-        return self.sensitivity_rows
 
     @classmethod
     def _from_record(
@@ -281,7 +277,7 @@ class Result(Summarized):
         path: str | PathLike[str],
         scene: Scene | None = None,
         visual_model: pin.GeometryModel | None = None,
-        **options: Unpack[FilmOptions],
+        **options: Any,
     ) -> Path:
         """Draw this result as a picture (.png) or a film (.mp4).
 

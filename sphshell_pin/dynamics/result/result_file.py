@@ -157,7 +157,7 @@ def save_result(result: Result, path: Path, home: str | PathLike[str] | None) ->
     if result.states is not None:
         arrays["states.values"] = np.concatenate([np.zeros(0), *result.states])
         arrays["states.sizes"] = np.array([len(one) for one in result.states], INT)
-    rows = result.sensitivity_rows
+    rows = result.sensitivities
     if rows is not None:
         header["sensitivities"] = rows.parameters
         for name in OPTIONAL["sensitivities"]:
@@ -241,7 +241,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
         if header.sensors
         else {},
         patch_rows=patches,
-        sensitivity_rows=sensitivities,
+        sensitivities=sensitivities,
         torque=arrays.get("torque"),
         states=result_parts.split_states(arrays.get("states.values"), arrays.get("states.sizes")),
     )

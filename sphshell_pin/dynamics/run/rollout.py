@@ -6,7 +6,7 @@ import math
 import re
 import time
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, NoReturn, overload
 
@@ -308,10 +308,6 @@ class Rollout(Summarized, Sequence[Result]):
             Fact("until", ended, "s"),
             Fact("varied", names(self.varied)),
         ]
-
-    def __iter__(self) -> Iterator[Result]:
-        """Go through the results of all runs."""
-        return (self[run] for run in range(len(self)))
 
     def __reduce__(self) -> NoReturn:
         """Refuse to be pickled: the runs are with the compiled core."""

@@ -127,7 +127,7 @@ class Simulation(Summarized):
 
         def so_far() -> Result:
             result = advancing.result_of(self.scene, self.integrator, core, core.take(), sensors)
-            return replace(result, sensitivity_rows=asked.rows(core)) if asked else result
+            return replace(result, sensitivities=asked.rows(core)) if asked else result
 
         try:
             with ctrl_c:

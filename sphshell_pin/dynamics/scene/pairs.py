@@ -54,7 +54,7 @@ class ContactPair(Summarized):
         return f"ContactPair '{self.name}'"
 
     def _facts(self) -> list[Fact]:
-        return [Fact("sphere", self.side_i.text), Fact("with", self.side_j.text)]
+        return [Fact("between", self.side_i.text), Fact("and", self.side_j.text)]
 
     @property
     def frame_i(self) -> str:
@@ -170,7 +170,7 @@ class ContactPair(Summarized):
     @cached_property
     def modelled(self) -> tuple[str, ...]:
         """What is modeled of this pair, in sentences."""
-        first, second = self.side_i.sentence, self.side_j.sentence
+        first, second = self.side_i.text, self.side_j.text
         bodies = f"{first} against {second}"
         if isinstance(self.side_i, ends.SourceSide):
             bodies = (

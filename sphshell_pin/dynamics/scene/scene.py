@@ -38,7 +38,7 @@ class Scene(SceneParts):
         cls,
         model: pin.Model,
         geometry_model: pin.GeometryModel,
-        law: NormalLaw | None = None,
+        law: NormalLaw,
         friction: Friction | None = None,
     ) -> Scene:
         """Build a scene from the active collision pairs of a geometry model.

@@ -24,7 +24,8 @@ from sphshell_pin.base.checks import (
     check_vector,
 )
 from sphshell_pin.base.summary import Fact, Summarized, names
-from sphshell_pin.contact import Friction, FunctionFriction, ImpactLaw, NormalLaw, Plane, Sphere
+from sphshell_pin.contact import Friction, FunctionFriction, NormalLaw, Plane, Sphere
+from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.compiled.robot import load_compiled
 from sphshell_pin.dynamics.scene import models
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, check_joints
@@ -160,10 +161,9 @@ class SceneParts(Summarized):
         lowest over it: the limit of a sphere whose radius grows. Its normals, too, lead from the
         shell into the other body, against the normal of the plane.
 
-        Without `friction` the contact has none; `method` is "smooth" (default), "facets" or
-        "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times larger than
-        the sphere or the robot, and with FutureWarning where no `law` is stated: it is then ADAMS's
-        default, ImpactLaw.from_adams().
+        A `law` is needed; without `friction` the contact has none; `method` is "smooth" (default),
+        "facets" or "elements". Returns the pair. Warns with UnitWarning of a shell a thousand times
+        larger than the sphere or the robot.
         """
         sides = sides_of(self.frame_in_joint, sphere, shell, frame, placement, method)
         pair = self._add(name, f"{sphere.frame}-{default_group(shell)}", *sides, law, friction)
@@ -208,7 +208,7 @@ class SceneParts(Summarized):
         find: Find,
         frame_i: str,
         frame_j: str,
-        law: NormalLaw | None = None,
+        law: NormalLaw,
         friction: Friction | None = None,
         name: str | None = None,
     ) -> ContactPair:
@@ -307,16 +307,9 @@ class SceneParts(Summarized):
         group: str = "",
     ) -> ContactPair:
         """Add a pair, called `default` unless `name` is given."""
-        if law is None:
-            law = ImpactLaw.from_adams()
-            warnings.warn(
-                "a contact without a law gets ADAMS's default, which is deprecated: state it, "
-                "law=ImpactLaw.from_adams() for the same",
-                FutureWarning,
-                stacklevel=3,
-            )
         _warn_of_friction_at_rest(friction)
-        pair = ContactPair(self._pair_name(name, default), side_i, side_j, law, friction, group)
+        called = self._pair_name(name, default)
+        pair = ContactPair(called, side_i, side_j, check_law(law), friction, group)
         self._pairs = (*self._pairs, pair)
         self._core = None
         return pair

@@ -99,9 +99,7 @@ class SceneState(Summarized):
         other._core = self._core.copy()
         return other
 
-    def __copy__(self) -> SceneState:
-        """Return `copy()`."""
-        return self.copy()
+    __copy__ = copy
 
     def __deepcopy__(self, memo: dict[int, object]) -> SceneState:
         """Return `copy()`: the scene, which does not change, is shared."""

@@ -85,11 +85,6 @@ class Side:
     @property
     def text(self) -> str:
         """The side in a few words."""
-        return f"'{self.frame}'"
-
-    @property
-    def sentence(self) -> str:
-        """The side as the words of a sentence on what is modeled."""
         return f"frame '{self.frame}'"
 
 
@@ -111,11 +106,6 @@ class SphereSide(Side):
 
     @property
     def text(self) -> str:
-        """Radius and frame."""
-        return f"radius {self.radius * 1e3:g} mm at '{self.frame}'"
-
-    @property
-    def sentence(self) -> str:
         """The sphere and its frame."""
         return f"sphere of radius {self.radius * 1e3:.4g} mm on frame '{self.frame}'"
 
@@ -153,11 +143,6 @@ class ShellSide(Side):
 
     @property
     def text(self) -> str:
-        """Shell, frame and method."""
-        return f"'{self.shell.name}' at '{self.frame}', {self.method}"
-
-    @property
-    def sentence(self) -> str:
         """The shell and its frame."""
         return f"shell '{self.shell.name}' on frame '{self.frame}'"
 
@@ -175,11 +160,6 @@ class PlaneSide(Side):
 
     @property
     def text(self) -> str:
-        """The frame of the plane."""
-        return f"plane at '{self.frame}'"
-
-    @property
-    def sentence(self) -> str:
         """The plane and its frame."""
         return f"plane on frame '{self.frame}'"
 
@@ -189,8 +169,3 @@ class SourceSide(Side):
     """The first body of a contact source, with the routine that says where it touches the other."""
 
     find: Find
-
-    @property
-    def text(self) -> str:
-        """The frame of the source."""
-        return f"contact source at '{self.frame}'"

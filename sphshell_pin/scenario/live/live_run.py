@@ -20,7 +20,7 @@ from sphshell_pin.dynamics.scene.scene import Scene, SceneContacts
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.scenario.format.reading import look_up
-from sphshell_pin.scenario.format.sliders import LiveParameter, live_parameters
+from sphshell_pin.scenario.format.sliders import live_parameters
 from sphshell_pin.scenario.live import acting
 from sphshell_pin.scenario.running.rows import Rows, Series, series_of
 
@@ -33,7 +33,9 @@ class LiveRun:
 
     It is a player of the live page. Parameters of laws, friction, radii and the controller act on
     the run under way; with others it starts again, from where it is if it can. `ended` is
-    why a run cannot go on; it waits for `reset` or another value.
+    why a run cannot go on; it waits for `reset` or another value. `parameters` are those with a
+    slider, with their present values; `exchanged` is the energy that changed form since the start
+    [J], the scale of `residual`.
 
     What it shows may be read in any thread; what changes it is for one thread at a time, and raises
     Busy in others.
@@ -48,7 +50,7 @@ class LiveRun:
         self.title = built.scenario.title or built.name
         self.start = 0.0
         self._user = _core.OneUser("LiveRun")
-        self._parameters = live_parameters(built)
+        self.parameters = live_parameters(built)
         self._aims: dict[str, float] = {}
         self._targets: tuple[acting.Target, ...] | None = None
         self._patches = "patch" in built.scenario.run.record
@@ -66,7 +68,7 @@ class LiveRun:
             run.record_torques()
         self._row = run.snapshot()
         self._total = float(self._row.energy.total[0])
-        self._exchanged = 0.0
+        self.exchanged = 0.0
 
     @property
     def scene(self) -> Scene:
@@ -109,19 +111,9 @@ class LiveRun:
         return float(self._row.energy.total[0] - self._total)
 
     @property
-    def exchanged(self) -> float:
-        """Energy that changed form since the start [J], the scale of `residual`."""
-        return self._exchanged
-
-    @property
     def ended(self) -> str | None:
         """Why the run cannot go on, one sentence; None while it can."""
         return self._fault or self._run.ended
-
-    @property
-    def parameters(self) -> tuple[LiveParameter, ...]:
-        """The parameters of the scenario with a slider, with their present values."""
-        return self._parameters
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -200,7 +192,7 @@ class LiveRun:
             reason = str(error) if isinstance(error, SphshellError) else repr(error)
             self._fault = ", ".join([reason, *getattr(error, "__notes__", ())])
             return Rows.empty(pairs)
-        self._exchanged += _exchanged(self._row, rows, now)
+        self.exchanged += _exchanged(self._row, rows, now)
         self._row = now
         return self._rows(rows)
 
@@ -229,7 +221,7 @@ class LiveRun:
     def _change(self, key: str, value: float | str) -> None:
         before = self.built
         if isinstance(value, str):
-            words = next((one.choices for one in self._parameters if one.key == key), ())
+            words = next((one.choices for one in self.parameters if one.key == key), ())
             if value not in words:
                 valid = f"one of {', '.join(words)}" if words else "a number"
                 raise InvalidParameter(key, value, f"must be {valid}")
@@ -250,25 +242,25 @@ class LiveRun:
         self.built = after
         self._targets = None
         # Their ranges stay those of the start: they do not wander with the values.
-        if isinstance(value, float) and key in (one.key for one in self._parameters):
-            self._parameters = tuple(
-                replace(one, value=value) if one.key == key else one for one in self._parameters
+        if isinstance(value, float) and key in (one.key for one in self.parameters):
+            self.parameters = tuple(
+                replace(one, value=value) if one.key == key else one for one in self.parameters
             )
         else:  # a word, or another spelling of a key
-            self._parameters = tuple(
+            self.parameters = tuple(
                 replace(one, value=str(now) if one.choices else float(now))
-                for one in self._parameters
+                for one in self.parameters
                 for now in [look_up(after.scenario, one.key, after.path).value]
             )
 
     def _go_on(self, run: OpenRun) -> None:
         """Go on with `run`, which is in the state of this one: with its push and its audit."""
-        residual, exchanged = self.residual, self._exchanged
+        residual, exchanged = self.residual, self.exchanged
         push, drag = self._push, self._drag
         run.take_over(self._run)
         self._begin(run)
         self._total -= residual
-        self._exchanged = exchanged
+        self.exchanged = exchanged
         if push is not None:
             run.push(push[0], push[1])
             self._push = push
