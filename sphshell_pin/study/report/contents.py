@@ -1,8 +1,8 @@
-"""What was measured: findings with their bounds, pictures and tables, and sections of them.
+"""What was measured: findings with their bounds, tables, and sections of them.
 
 The report states its results in these, and so do the validation, the hard cases and the other
 engines of a checkout. A table is a csv file, an HTML table on the page and a Markdown table in the
-documents; a picture is a png file, which the page holds, too.
+documents.
 """
 
 from __future__ import annotations
@@ -152,15 +152,6 @@ class Table:
             for row in self.rows
         ]
 
-    @property
-    def numeric(self) -> list[bool]:
-        """Whether a column holds numbers."""
-        firsts = (
-            next((row[k] for row in self.rows if row[k] is not None), "")
-            for k in range(len(self.columns))
-        )
-        return [not isinstance(first, str) for first in firsts]
-
     def csv(self) -> str:
         """Return the table as csv, with all digits."""
         stream = io.StringIO()
@@ -179,16 +170,6 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture as png, what it shows for those who cannot see it, and its caption."""
-
-    name: str
-    png: bytes
-    description: str
-    caption: str
-
-
-@dataclass(frozen=True)
 class Section:
     """One section of the page; `error` where it could not be measured, in one sentence."""
 
@@ -196,7 +177,6 @@ class Section:
     title: str
     text: str = ""
     findings: list[Finding] = field(default_factory=list)
-    pictures: list[Picture] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     error: str | None = None
