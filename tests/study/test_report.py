@@ -65,13 +65,12 @@ def panda(*, quick, progress):
     names = steps.WHOLE[:-1]
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
     whole[steps.CONTROL_TOUCHING] = times(3.5e-6)
-    imports = {"sphshell_pin": times(0.14), "pinocchio": times(0.13)}
-    return steps.assemble(whole, imports)
+    return steps.assemble(whole)
 
 
 def parts_of(*measures) -> tuple[making.Part, ...]:
     return tuple(
-        making.Part(known.key, known.title, measure, (1.0, 1.0), pinned=False)
+        making.Part(known.key, known.title, measure, (1.0, 1.0))
         for known, measure in zip(making.PARTS, measures, strict=True)
     )
 

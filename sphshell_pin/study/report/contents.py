@@ -7,8 +7,6 @@ documents.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.tables import csv_text
 
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""
@@ -154,11 +153,9 @@ class Table:
 
     def csv(self) -> str:
         """Return the table as csv, with all digits."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([column.key for column in self.columns])
-        writer.writerows(self.rows)
-        return stream.getvalue()
+        keys = [column.key for column in self.columns]
+        cells = np.array(self.rows, dtype=object).reshape(-1, len(keys))
+        return csv_text(dict(zip(keys, cells.T, strict=True)))
 
     def markdown(self) -> str:
         """Return the table as Markdown."""

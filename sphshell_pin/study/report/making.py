@@ -1,6 +1,5 @@
 """Measure the sections one after another, and write the page and its tables."""
 
-import contextlib
 import dataclasses
 import json
 import os
@@ -32,14 +31,13 @@ Tell = Callable[[str, float], None]
 class Part:
     """A section to be, of measure(quick=, progress=).
 
-    `seconds` it takes, about, with --quick and in full; `pinned` to a core.
+    `seconds` it takes, about, with --quick and in full.
     """
 
     key: str
     title: str
     measure: Callable[..., Section]
     seconds: tuple[float, float]
-    pinned: bool = True
 
 
 PARTS = (
@@ -120,7 +118,7 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
             # are measured with steps that are too long, too.
             for kind in (WeakLawWarning, SetupWarning):
                 warnings.simplefilter("ignore", kind)
-            with timing.on_one_core() if part.pinned else contextlib.nullcontext():
+            with timing.on_one_core():
                 section = part.measure(quick=quick, progress=progress)
     except KeyboardInterrupt:  # Interrupted is an Exception, too
         raise
