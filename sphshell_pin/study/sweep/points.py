@@ -148,10 +148,10 @@ def text_of(value: Value) -> str:
 
 
 def _stated(
-    name: str, given: Mapping[str, Any] | Iterable[str], must: str, what: str
-) -> dict[str, Any]:
+    name: str, given: Mapping[str, object] | Iterable[str], must: str, what: str
+) -> dict[str, object]:
     """Return what is stated by key; InvalidParameter for a key given twice, and for none."""
-    found: dict[str, Any] = {}
+    found: dict[str, object] = {}
     for key, one in stated_pairs(name, given, must):
         if key in found:
             raise InvalidParameter(name, key, "is given twice: put all that it may be together")
