@@ -104,7 +104,7 @@ def test_a_number_has_one_name(part, table, name, tmp_path):
     assert list(plan_sweep(path, {key: [after]}).points.values) == [key]
     if name != "seed":
         (free,) = free_parameters([key], built.scenario, path)
-        assert (free.key, free.start) == (key, before)
+        assert (free.keys, free.start) == ((key,), before)
     whole, values = key, [after]
     if name == "offset.2":
         whole, values = f"{head}.offset", [[0.0, 0.0, after]]

@@ -48,7 +48,7 @@ def bowl(side: float) -> Bowl:
         name="bowl" if side == 0.3 else "bowl fine",
         title=f"Ball swings in a bowl without friction, triangles of {side:g} radii",
         surface=shapes.bowl(side),
-        duration=(swing.PERIODS + 0.35) * swing.closed_form(),
+        duration=(swing.PERIODS + 0.35) * swing.PERIOD,
         dts=(2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5),
         position=tuple(swing.start(0.0).tolist()),
         damping=0.0,

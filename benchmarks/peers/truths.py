@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import ClassVar
 
 import numpy as np
@@ -153,19 +152,13 @@ class Bowl(BallScene):
         if found.energy is not None:
             accounts.append(found.energy)
         changes = [float(np.abs(e - e[0]).max()) / swing.ENERGY for e in accounts if len(e) > 1]
-        return {"period": abs(period / exact_period() - 1), "energy": min(changes)}
+        return {"period": abs(period / swing.PERIOD - 1), "energy": min(changes)}
 
     @staticmethod
     def joined(errors: list[dict[str, float]]) -> dict[str, float]:
         """Return root mean square of the periods' errors, mean of the energies'."""
         periods, energies = (np.array([e[name] for e in errors]) for name in ("period", "energy"))
         return {"period": float(np.sqrt(np.mean(periods**2))), "energy": float(energies.mean())}
-
-
-@cache
-def exact_period() -> float:
-    """Return the period [s] of the exact bowl with its spring."""
-    return swing.reference_period()
 
 
 ORBIT = 40.0  # [rad/s]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,50 +54,31 @@ def compare(runs: list[Path], *, out: Path = Path("results/compare"), picture: b
 
 
 def labels_of(runs: list[Path]) -> list[str]:
-    """Return a short name for each run: its folder's or its file's, its path where they repeat."""
+    """Return a short name for each run: its folder's or its file's, with a number if it repeats."""
     paths = [file_of(run).absolute() for run in runs]
     short = [one.parent.name if one.name == "run.npz" else one.stem for one in paths]
-    if len(set(short)) == len(short):
-        return short
-    named = [str(run) for run in runs]
-    return [name if name not in named[:k] else f"{name} ({k + 1})" for k, name in enumerate(named)]
+    return [one if short.count(one) == 1 else f"{one} ({k})" for k, one in enumerate(short, 1)]
 
 
 def _print(first: str, other: Difference) -> None:
     """Print what of `other` is not as in the run `first`."""
     common.say(f" beside {first}", bold=other.label)
-    settings = [(key, _shown(mine), _shown(yours)) for key, mine, yours in other.settings]
-    common.print_table(("setting", first, other.label), settings[:MOST_ROWS])
-    figures = [
-        (
-            column(one.name, one.unit),
-            f"{one.first:.6g}",
-            f"{one.other:.6g}",
-            f"{one.absolute:+.3g}",
-            "-" if math.isnan(one.relative) else f"{100 * one.relative:+.3g} %",
-        )
-        for one in other.figures
-        if not one.same
-    ]
-    titles = ("figure", first, other.label, "difference", "relative")
-    common.print_table(titles, figures[:MOST_ROWS])
-    curves = [
-        (
-            one.name,
-            f"{one.largest:.4g} {one.unit}",
-            f"{one.at:.4g} s",
-            f"{one.rms:.3g} {one.unit}",
-            "-" if math.isnan(one.of_range) else f"{100 * one.of_range:.3g} %",
-        )
-        for one in sorted(other.curves, key=lambda one: -one.of_range)
-        if one.largest
-    ]
-    titles = ("curve", "largest difference", "at", "rms", "of its range")
-    common.print_table(titles, curves[:MOST_ROWS])
-    for title, rows in (("settings", settings), ("figures", figures), ("curves", curves)):
+    both = first, other.label
+    figures = [one for one in other.figures if not one.same]
+    curves = sorted((one for one in other.curves if one.largest), key=lambda one: -one.of_range)
+    whole: dict[str, tuple[tuple[str, ...], list[tuple[object, ...]]]] = {
+        "setting": (both, [(key, "", *values) for key, *values in other.settings]),
+        "figure": ((*both, "difference", "relative"), [*figures]),
+        "curve": (("largest difference", "at [s]", "rms", "over range"), [*curves]),
+    }
+    for title, (titles, rows) in whole.items():
+        cells = [
+            (column(str(name), str(unit)), *map(_shown, values[: len(titles)]))
+            for name, unit, *values in rows[:MOST_ROWS]
+        ]
+        common.print_table((title, *titles), cells)
         if len(rows) > MOST_ROWS:
-            see = "" if title == "settings" else ": see the tables"
-            common.say(f"{len(rows) - MOST_ROWS} more {title} differ{see}")
+            common.say(f"{len(rows) - MOST_ROWS} more {title}s differ")
     same = len(other.figures) - len(figures), len(other.curves) - len(curves)
     common.say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
     for label, names in ((first, other.only_first), (other.label, other.only_other)):
@@ -108,5 +88,6 @@ def _print(first: str, other: Difference) -> None:
 
 
 def _shown(value: object) -> str:
-    text = "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    text = "-" if text in ("nan", "None") else text
     return text if len(text) <= 40 else f"{text[:37]}..."

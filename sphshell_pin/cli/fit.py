@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import typer
 
 from sphshell_pin.cli import common
-from sphshell_pin.errors import InvalidParameter, ScenarioError
+from sphshell_pin.errors import InvalidParameter
 
 if TYPE_CHECKING:
-    from sphshell_pin.study.fit import Experiment, Fit
+    from sphshell_pin.study.fit import Experiment
 
 
 @common.command()
@@ -48,19 +48,20 @@ def fit(
     out : Folder of the files; by default results/SCENARIO.
     picture : Draw fit and residuals.
     """
+    from sphshell_pin.base.atomic.files import write_folder
+    from sphshell_pin.plot.figure import png
     from sphshell_pin.scenario.format.reading import find_scenario, read_scenario
     from sphshell_pin.study.fit import Experiment
     from sphshell_pin.study.fit import fit as fit_scenario
-    from sphshell_pin.study.fit.parameters import free_parameters, parse_wanted
+    from sphshell_pin.study.fit.parameters import free_parameters
     from sphshell_pin.study.fit.writing import scenario_text
 
     changes = common.changes_of(set_, compiled=compiled)
-    wanted = parse_wanted(param)
     given = [Experiment(path) for path in data or []]
     given += [_experiment(text) for text in experiment or []]
     path = find_scenario(scenario)
     # Where no value can be written, it is said before the runs.
-    free = free_parameters(wanted, read_scenario(path, changes), path)
+    free = free_parameters(param, read_scenario(path, changes), path)
     starts = {key: repr(one.start) for one in free for key in one.keys}
     scenario_text(path, {**changes, **starts}, path.parent)
     status = "{task.completed} runs, misfit {task.fields[misfit]}"
@@ -72,15 +73,21 @@ def fit(
             update(completed=runs, misfit=shown)
 
         found = fit_scenario(
-            scenario,
-            given,
-            wanted,
-            changes=changes,
-            columns=column,
-            progress=progress,
+            scenario, given, param, changes=changes, columns=column, progress=progress
         )
-    files = _write(found, path, out or Path("results") / path.stem, changes, picture=picture)
-    _print_report(found, files)
+    folder, name = out or Path("results") / path.stem, f"{path.stem}.fitted.toml"
+    # What fails in the making leaves no file behind.
+    made = {name: found.scenario_text(folder, changes).encode()}
+    made["fit.json"] = found.to_json().encode()
+    if picture:
+        with common.if_installed():
+            made["fit.png"] = png(found.plot())
+    # Never new values beside an old report.
+    files = write_folder(folder, made, ["fit.json", name, "fit.png"])
+    done = f": {len(given)} experiments, {found.runs} runs, {found.level:.0%} intervals"
+    common.say(done, bold=found.scenario)
+    common.echo(found)
+    common.say(f"files: {', '.join(map(str, files))}")
     if not found.determined:
         raise typer.Exit(common.MISSED)
 
@@ -96,53 +103,3 @@ def _experiment(text: str) -> Experiment:
     if not file or not all("=" in one for one in changes):
         raise InvalidParameter("--experiment", text, "must be 'DATA.csv KEY=VALUE ...'")
     return Experiment(file, common.changes_of(changes), " ".join([Path(file).stem, *changes]))
-
-
-def _write(
-    found: Fit, path: Path, folder: Path, changes: dict[str, str], *, picture: bool
-) -> list[Path]:
-    from sphshell_pin.base.atomic.files import write_folder
-    from sphshell_pin.scenario.format.reading import read_scenario
-    from sphshell_pin.scenario.format.sliders import check_knobs
-
-    # What fails in the making leaves no file behind.
-    made = {"fit.json": found.to_json().encode()}
-    if picture:
-        from sphshell_pin.plot.figure import png
-
-        with common.if_installed():
-            made["fit.png"] = png(found.plot())
-    name = f"{path.stem}.fitted.toml"
-    made = {name: found.scenario_text(folder, changes).encode(), **made}
-    # Never new values beside an old report.
-    files = write_folder(folder, made, ["fit.json", name, "fit.png"])
-    fitted = folder / name
-    try:
-        check_knobs(read_scenario(fitted), fitted, ranges=True)
-    except ScenarioError as fault:
-        common.echo(f"note: the fitted scenario needs a change before it runs: {fault}", err=True)
-    return files
-
-
-def _print_report(found: Fit, files: list[Path]) -> None:
-    from sphshell_pin.study.fit.report import interval_text
-
-    count = sum(len(one.t) for one in found.series)
-    experiments = len({one.experiment for one in found.series})
-    text = f": {count} values of {experiments} experiments, {found.runs} runs"
-    common.say(text, bold=found.scenario)
-    common.print_table(
-        ("parameter", "start", "value", f"{found.level:.0%} interval", "unit"),
-        (
-            (one.key, f"{one.start:.6g}", f"{one.value:.6g}", interval_text(one), one.unit)
-            for one in found.parameters
-        ),
-    )
-    series = (
-        (f"{one.name} of {one.experiment}", f"{len(one.t)}", f"{one.rms:.4g}", one.unit)
-        for one in found.series
-    )
-    common.print_table(("data", "values", "rms residual", "unit"), series)
-    for remark in found.remarks:
-        common.echo(f"note: {remark}", err=True)
-    common.say(f"files: {', '.join(map(str, files))}")

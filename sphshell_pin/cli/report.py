@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
 from sphshell_pin.cli import common
 from sphshell_pin.cli.common import command
-
-if TYPE_CHECKING:
-    from sphshell_pin.study.report import Report
 
 
 @command()
@@ -29,6 +25,7 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
     out : Folder of the page and its tables.
     """
     from sphshell_pin.study.report import PAGE, make_report
+    from sphshell_pin.study.report.contents import findings_table
 
     # Without --out: the folder is no part of what was measured.
     command = f"sphshell-pin report{' --quick' * quick}"
@@ -39,18 +36,11 @@ def report(*, quick: bool = False, out: Path = Path("results/report")) -> None:
             command=command,
             tell=lambda title, share: update(description=title, completed=share),
         )
-    _print(made)
-    common.say(f"page: {out / PAGE}")
-    raise typer.Exit(common.MISSED if made.failed else 0)
-
-
-def _print(made: Report) -> None:
-    rows = []
-    for one in [one for section in made.sections for one in section.findings]:
-        cell = common.colored(one.verdict, "green" if one.met else "red")
-        rows.append((one.what, one.text, one.spread_text, one.aim_text, cell))
-    common.print_table(("figure", "median", "quartiles", "aim", "verdict"), rows)
+    table = findings_table([one for section in made.sections for one in section.findings])
+    common.print_table([one.heading for one in table.columns], table.cells)
     if made.caution:
         common.echo(f"caution: {made.caution}", err=True)
     for section in made.failed:
         common.echo(f"not measured: {section.title}: {section.error}", err=True)
+    common.say(f"page: {out / PAGE}")
+    raise typer.Exit(common.MISSED if made.failed else 0)

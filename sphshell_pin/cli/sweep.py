@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from sphshell_pin.base.tables import column
 from sphshell_pin.cli import common
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sphshell_pin.study.sweep import Plan, SweepReport
 
 # So many failed runs are listed one by one.
 _MOST_FAILURES = 5
@@ -63,52 +63,54 @@ def sweep(
     plot FIGURE : Figure to draw; may be given several times.
     pictures : Draw curves or maps of the table.
     """
-    from sphshell_pin.study.sweep import plan_sweep, run_plan
+    from sphshell_pin.study.sweep import plan_sweep, quantiles, run_plan
+    from sphshell_pin.study.sweep.indices import figures_of
 
-    plan = plan_sweep(
-        scenario,
-        vary,
-        changes=common.changes_of(set_, dt, duration, compiled),
-        dist=dist,
-        n=n,
-        seed=seed,
-        indices=indices,
-    )
-    name = plan.job.path.stem
+    changes = common.changes_of(set_, dt, duration, compiled)
+    plan = plan_sweep(scenario, vary, changes=changes, dist=dist, n=n, seed=seed, indices=indices)
+    name, total, before = plan.job.path.stem, len(plan.runs), list[int]()
     for figure in plot or ():
         if figure not in plan.figures:
             raise NameNotFound("figure", figure, "a run of this scenario", plan.figures)
     file = out or Path("results") / name / "sweep.parquet"
     columns = "MofNCompleteColumn", "[red]{task.fields[failures]}[/red]", "TimeRemainingColumn"
     try:
-        with common.progress_bar("runs", *columns, total=None, failures="") as update:
+        with common.progress_bar("runs", *columns, total=total, failures="") as update:
 
             def progress(done: int, failed: int, total: int) -> None:
-                failures = f"{failed} failed" if failed else ""
-                update(completed=done, total=total, failures=failures)
+                before.append(done)
+                update(completed=done, failures=f"{failed} failed" if failed else "")
 
-            report = run_plan(
+            table = run_plan(
                 plan, workers=workers, scheduler=scheduler, out=file, progress=progress
             )
     except KeyboardInterrupt as stop:
         again = shlex.join(["sphshell-pin", *sys.argv[1:]])
         raise KeyboardInterrupt(f"{stop}; to go on: {again}" if str(stop) else "") from None
-    total = len(plan.runs)
-    before = f"; {report.resumed} were done before" if report.resumed else ""
-    done = f"{total - report.failed} done, {report.failed} failed{before}"
+    failed = table[table["status"] == "failed"]
+    more = f"; {before[0]} were done before" if before[0] else ""
+    done = f"{total - len(failed)} done, {len(failed)} failed{more}"
     common.say(f": {total} runs, {done}", bold=name)
-    figures = plot or _first_figures(report.table)
+    shown = [one for one in figures_of(table) if _varies(table[one])]
     if plan.points.parts:
-        _print_sample(plan, report.table)
+        found = quantiles(table).loc[[*plan.points.values, *shown], [5, 50, 95, "mean", "runs"]]
     else:
-        _print_ranges(report.table)
+        found = table[shown].agg(["min", "idxmin", "max", "idxmax"]).T
+        found.columns = ["smallest", "in run", "largest", "in this run"]
+    found.index = [column(one, plan.units.get(one, "")) for one in found.index]
+    _print("quantiles [%]" if plan.points.parts else "figure", found)
     files = [file]
-    for figure in figures:
-        found = _indices(report.table, figure)
-        files += _draw(file, report.table, figure, found) if pictures else []
-    _print_failures(plan, report)
+    for figure in plot or _first_figures(table):
+        of_inputs = _indices(table, figure)
+        files += _draw(file, table, figure, of_inputs) if pictures else []
+    for _, row in failed.head(_MOST_FAILURES).iterrows():
+        stated = [f"{key} = {row[key]} {plan.units.get(key, '')}" for key in plan.points.values]
+        values = ", ".join(map(str.rstrip, stated))
+        common.echo(f"run {row['run']} failed ({values}): {row['error']}", err=True)
+    if len(failed) > _MOST_FAILURES:
+        common.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
     common.say(f"files: {', '.join(map(str, files))}")
-    if report.failed == total:
+    if len(failed) == total:
         raise typer.Exit(common.ERROR)
 
 
@@ -136,39 +138,6 @@ def _draw(file: Path, table: pd.DataFrame, figure: str, indices: pd.DataFrame | 
     return []
 
 
-def _print_ranges(table: pd.DataFrame) -> None:
-    """Print the range of each figure of a grid."""
-    from sphshell_pin.study.sweep.indices import figures_of
-
-    rows = []
-    for name in figures_of(table):
-        column = table[name]
-        if not name.startswith("final.") and column.nunique() > 1:
-            low, high = column.idxmin(), column.idxmax()
-            rows.append((name, f"{column[low]:.6g}", f"{low}", f"{column[high]:.6g}", f"{high}"))
-    common.print_table(("figure", "smallest", "in run", "largest", "in run"), rows)
-
-
-def _print_sample(plan: Plan, table: pd.DataFrame) -> None:
-    """Print the inputs of a sample, and the quantiles of the figures that vary."""
-    from sphshell_pin.study.sweep import quantiles
-
-    inputs = []
-    for key, one in plan.points.dists.items():
-        ends = (f"{end:.6g}" for end in one.ppf([0.05, 0.5, 0.95]))
-        inputs.append((key, *ends, plan.units.get(key, "")))
-    common.print_table(("input", "5 %", "median", "95 %", "unit"), inputs)
-    found = quantiles(table)
-    rows, met = [], []
-    for name, row in ((str(name), row) for name, row in found.iterrows()):
-        if name.startswith("met."):
-            met.append((name.removeprefix("met."), f"{100 * row['mean']:.4g} % of the runs"))
-        elif not name.startswith("final.") and row[5] < row[95]:
-            rows.append((name, *(f"{one:.6g}" for one in row.iloc[:5]), f"{row['runs']:.0f}"))
-    common.print_table(("figure", "5 %", "25 %", "median", "75 %", "95 %", "runs"), rows)
-    common.print_table(("expectation", "met in"), met)
-
-
 def _indices(table: pd.DataFrame, figure: str) -> pd.DataFrame | None:
     """Print the Sobol indices of a figure and return them, if the sweep has them.
 
@@ -183,18 +152,17 @@ def _indices(table: pd.DataFrame, figure: str) -> pd.DataFrame | None:
     except InvalidParameter as fault:
         common.echo(f"no indices: {fault}", err=True)
         return None
-    titles = (f"indices of {figure}", *map(str, found.columns))
-    rows = ((str(key), *(f"{x:.6g}" for x in row)) for key, row in found.iterrows())
-    common.print_table(titles, rows)
+    _print(f"indices of {figure}", found)
     return found
 
 
-def _print_failures(plan: Plan, report: SweepReport) -> None:
-    failed = report.table[report.table["status"] == "failed"]
-    for _, row in failed.head(_MOST_FAILURES).iterrows():
-        values = [
-            f"{key} = {row[key]} {plan.units.get(key, '')}".rstrip() for key in plan.points.values
-        ]
-        common.echo(f"run {row['run']} failed ({', '.join(values)}): {row['error']}", err=True)
-    if len(failed) > _MOST_FAILURES:
-        common.echo(f"and {len(failed) - _MOST_FAILURES} more: see the column error", err=True)
+def _varies(values: pd.Series[float]) -> bool:
+    """Whether a figure is worth a line: it is not the same in all runs, or says what was met."""
+    name, count = str(values.name), values.nunique()
+    return not name.startswith("final.") and count > (0 if name.startswith("met.") else 1)
+
+
+def _print(title: str, table: pd.DataFrame) -> None:
+    """Print a table of numbers with the names of its rows."""
+    rows = ((str(name), *(f"{x:.6g}" for x in row)) for name, row in table.iterrows())
+    common.print_table((title, *map(str, table.columns)), rows)

@@ -38,13 +38,11 @@ def plot_compare(runs: Sequence[Measured], differences: Sequence[Difference]) ->
     axes = figure.subplots(max(len(names), 1), 2, sharex=True, squeeze=False)
     if not names:
         say(axes[0, 0], "no curve of both at one time")
+    off = [{one.name: one.difference for one in other.curves} for other in differences]
     for name, (over, beside) in zip(names, axes, strict=False):
         _draw(over, name, [run.curves.get(name) for run in runs], runs)
-        off = [
-            next((one.difference for one in other.curves if one.name == name), None)
-            for other in differences
-        ]
-        _draw(beside, f"{name}, less that of {runs[0].label}", [None, *off], runs)
+        away_of = [None, *(one.get(name) for one in off)]
+        _draw(beside, f"{name}, less that of {runs[0].label}", away_of, runs)
     finish_axis(axes[0, 0], legend=bool(names))
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")

@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sphshell_pin.study.fit.report import Fit, Series
+    from sphshell_pin.study.fit.data import Series
+    from sphshell_pin.study.fit.report import Fit
 
 MOST_PANELS = 6
 _PREFIXED = ("N", "m", "J")

@@ -133,49 +133,43 @@ def compare(runs: Sequence[Measured]) -> tuple[Difference, ...]:
 
 def tables_of(differences: Sequence[Difference]) -> dict[str, Table]:
     """Return the tables "figures" and "curves": a row for each of another run."""
-    titles = {
-        "figures": ("run", "figure", "unit", "first", "other", "difference", "relative"),
-        "curves": ("run", "curve", "unit", "largest", "at [s]", "rms", "largest over range"),
+    rows: dict[str, list[tuple[object, ...]]] = {
+        "figures": [("run", "figure", "unit", "first", "other", "difference", "relative")],
+        "curves": [("run", "curve", "unit", "largest", "at [s]", "rms", "largest over range")],
     }
-    rows: dict[str, list[tuple[str | float, ...]]] = {
-        "figures": [(other.label, *one) for other in differences for one in other.figures],
-        "curves": [(other.label, *one[:-1]) for other in differences for one in other.curves],
-    }
+    for other in differences:
+        rows["figures"] += [(other.label, *one) for one in other.figures]
+        rows["curves"] += [(other.label, *one[:-1]) for one in other.curves]
     return {
-        name: {title: [row[k] for row in rows[name]] for k, title in enumerate(columns)}
-        for name, columns in titles.items()
+        name: {str(title): list(values) for title, *values in zip(*lines, strict=True)}
+        for name, lines in rows.items()
     }
 
 
 def _difference(first: Measured, other: Measured) -> Difference:
-    if not first.curves.keys() & other.curves.keys():
+    both = [name for name in first.curves if name in other.curves]
+    if not both:
         reason = f"has no contact and no joint in common with {first.label}: nothing to compare"
         raise ResultError(other.label, reason)
     keys = dict.fromkeys((*first.settings, *other.settings))
     settings = [(key, first.settings.get(key), other.settings.get(key)) for key in keys]
-    curves = (
-        _curve_difference(name, curve, other.curves[name])
-        for name, curve in first.curves.items()
-        if name in other.curves
-    )
+    curves = (_curve_difference(name, first.curves[name], other.curves[name]) for name in both)
+    figures = []
+    for name, (value, unit) in first.figures.items():
+        if name in other.figures:
+            away = other.figures[name][0] - value
+            relative = away / abs(value) if value else math.nan
+            figures.append(
+                FigureDifference(name, unit, value, other.figures[name][0], away, relative)
+            )
     return Difference(
         other.label,
-        tuple(
-            _figure_difference(name, unit, value, other.figures[name][0])
-            for name, (value, unit) in first.figures.items()
-            if name in other.figures
-        ),
+        tuple(figures),
         tuple(one for one in curves if one is not None),
         tuple(one for one in settings if one[1] != one[2]),
-        tuple(name for name in first.curves if name not in other.curves),
-        tuple(name for name in other.curves if name not in first.curves),
+        tuple(name for name in first.curves if name not in both),
+        tuple(name for name in other.curves if name not in both),
     )
-
-
-def _figure_difference(name: str, unit: str, first: float, other: float) -> FigureDifference:
-    away = other - first
-    relative = away / abs(first) if first else math.nan
-    return FigureDifference(name, unit, first, other, away, relative)
 
 
 def _curve_difference(name: str, first: Curve, other: Curve) -> CurveDifference | None:

@@ -10,7 +10,6 @@ from sphshell_pin.errors import DataError, InvalidParameter, InvalidShell, Resul
 from sphshell_pin.patches import ShellTaxels
 from sphshell_pin.study.fit import Experiment
 from sphshell_pin.study.fit.data import read_experiment
-from sphshell_pin.study.quantities import Quantity
 from tests.models import LAW, ball, free_q, on_plate
 
 Q = free_q([0.0, 0.0, 0.049])
@@ -50,9 +49,8 @@ def test_arguments_are_named(tmp_path) -> None:
 
 def read(force, **more):
     """Return the data of a force at two times; `more` columns by name."""
-    known = {"f": Quantity("f", "N", lambda _, t: t)}
     data = {"t [s]": [0.0, 1.0], "f [N]": force} | more
-    return read_experiment(Experiment(data), 1, known, 1.0)
+    return read_experiment(Experiment(data), 1, {"f": "N"}, 1.0)
 
 
 def test_data_that_cannot_be_computed_with_are_named() -> None:
@@ -60,4 +58,4 @@ def test_data_that_cannot_be_computed_with_are_named() -> None:
         read([1.0, 1e308])
     with pytest.raises(DataError, match=r"'f.sigma' must be positive .*too small to compute with"):
         read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
-    assert read(np.ma.masked_greater([1.0, 2.0], 1.5)).columns[0].values.tolist() == [1.0]
+    assert read(np.ma.masked_greater([1.0, 2.0], 1.5))[0].measured.tolist() == [1.0]

@@ -31,7 +31,7 @@ def drift(scene: sp.Scene, swings: int = SWINGS) -> tuple[float, float]:
 
     The drift is the change of the mean from the first to the last swing.
     """
-    period = swing.closed_form()
+    period = swing.PERIOD
     simulation = sp.Simulation(scene, sp.Adaptive(1e-10))
     start = swing.start(float(swing.AZIMUTHS[0]))
     result = simulation.run(start, None, swings * period, record_dt=period / 200)

@@ -15,8 +15,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.atomic.files import held_folder
-from sphshell_pin.cli import fit
+from sphshell_pin.base.atomic.files import held_folder, write_folder
 from sphshell_pin.errors import ResultError, ScenarioError, ShellFileError
 from sphshell_pin.plot.figure import write_figure
 from sphshell_pin.scenario import build, run_built
@@ -27,7 +26,7 @@ from sphshell_pin.study.report.contents import Column, Section, Table
 from sphshell_pin.study.sweep.driver import write_table
 from sphshell_pin.view.film import render_film
 from tests import meshes
-from tests.scenario.files import DROP, write
+from tests.scenario.files import write
 from tests.scenario.operations import contents, counted, fill, killed_at, visible
 from tests.studies import mostly_studies
 
@@ -181,8 +180,8 @@ def of_sweep(seed):
 
 
 def of_fit(value):
-    found = SimpleNamespace(to_json=lambda: value, scenario_text=lambda *_: DROP + f"# {value}")
-    return lambda place: fit._write(found, Path("s.toml"), place / "fit", {}, picture=False)
+    made = {"fit.json": value.encode(), "s.fitted.toml": f"# {value}".encode()}
+    return lambda place: write_folder(place / "fit", made, ["fit.json", "s.fitted.toml"])
 
 
 def of_film(count):

@@ -32,8 +32,8 @@ def exact(path: Path) -> tuple[Array, dict[str, Array]]:
     run = built.scenario.run
     t: Array = STEP * np.arange(1, round(run.duration / STEP) + 1, dtype=float)
     result = built.simulation.run(built.q0, built.v0, run.duration, record_dt=STEP)
-    known = quantities_of(built)
-    return t, {name: known[name].at(result, t) for name in COLUMNS}
+    known = quantities_of(result, built.scene, t, COLUMNS)
+    return t, {name: values for name, (_, values) in known.items()}
 
 
 def one_set(path: Path, number: int) -> tuple[Array, Array, Array, int]:

@@ -29,8 +29,8 @@ def columns_of(path, t, names, changes=None):
     result = built.simulation.run(
         built.q0, built.v0, float(t[-1]), built.controller, record_dt=row_step(t)
     )
-    known = quantities_of(built)
-    return {f"{name} [{known[name].unit}]": known[name].at(result, t) for name in names}
+    known = quantities_of(result, built.scene, t, names)
+    return {f"{name} [{unit}]": values for name, (unit, values) in known.items()}
 
 
 def noisy(columns, share, seed=0):
@@ -236,11 +236,18 @@ def test_a_sensor_is_read_as_it_logs(bounce, tmp_path):
         sp.fit(path, late, [STIFFNESS])
 
 
-def test_the_run_at_the_start_must_succeed(bounce):
+def test_the_run_at_the_start_must_succeed(bounce, monkeypatch):
     deep = {"robot.ball.start.root_joint.2": "0.001"}
     data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
-    with pytest.raises(sp.SphshellError, match="starts at depth") as caught:
+    with pytest.raises(sp.SphshellError, match="starts at depth"):
         sp.fit(bounce, data, [STIFFNESS], changes=deep)
+
+    def fail(*_):
+        raise sp.SphshellError("ends early")
+
+    monkeypatch.setattr("sphshell_pin.study.fit.search.Trial.predict", fail)
+    with pytest.raises(sp.SphshellError, match="ends early") as caught:
+        sp.fit(bounce, data, [STIFFNESS])
     assert caught.value.__notes__ == ["this is the run at the start values"]
 
 
@@ -255,7 +262,7 @@ def test_what_is_seen_stands_out_from_the_error_of_derivatives():
     jacobian[:, 2] = 1e-9 * jacobian[:, 1] * (1 + 1e-6 * rng.normal(size=50))
     covariance, blind = covariance_of(jacobian, error)
     assert np.isfinite(np.diag(covariance)).tolist() == [True, False, False]
-    assert [one.tolist() for one in blind] == [[1, 2]]
+    assert blind == [[1, 2]]
     # The first is determined whatever the other two do.
     others = jacobian[:, 1:2]
     residual = jacobian[:, 0] - others @ np.linalg.lstsq(others, jacobian[:, 0], rcond=None)[0]

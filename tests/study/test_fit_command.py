@@ -12,7 +12,6 @@ pytest.importorskip("matplotlib")
 import sphshell_pin as sp
 from sphshell_pin.base.tables import csv_text
 from sphshell_pin.scenario import read_scenario
-from sphshell_pin.study.fit.parameters import parse_wanted
 from tests.command import call, succeed
 from tests.study.fitted_sets import SCENARIO
 from tests.study.test_fit import DISSIPATION, FORCE, FRICTION, HEIGHT, STIFFNESS, columns_of, noisy
@@ -51,7 +50,6 @@ def test_the_command_ends_with_1_where_the_data_do_not_determine(bounce, tmp_pat
     assert f"the data do not determine {STIFFNESS}" in done.output
     done = call(*command, "--set", f"{STIFFNESS}=-1")
     assert done.exit_code == 2
-    assert parse_wanted(["a=1:2", "b"]) == {"a": (1.0, 2.0), "b": None}
 
 
 def test_what_is_not_told_from_0_is_a_result_like_others(bounce):

@@ -11,9 +11,9 @@ import sphshell_pin as sp
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.study.fit.data import read_experiment
+from sphshell_pin.study.fit.search import Trial
 from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
-from sphshell_pin.study.quantities import quantities_of
 from tests.command import refused
 from tests.study.fitted_sets import SCENARIO
 
@@ -31,6 +31,8 @@ def built(tmp_path_factory):
 @pytest.fixture
 def read(built, tmp_path):
     """Reads a csv file with this text, or columns."""
+    found = Trial(built).measure(np.zeros(1))
+    known = {name: unit for name, (unit, _) in found.items()}
 
     def read_data(data, **options):
         if isinstance(data, str | bytes):
@@ -38,7 +40,7 @@ def read(built, tmp_path):
             path.write_bytes(data if isinstance(data, bytes) else data.encode())
             data = path
         return read_experiment(
-            sp.Experiment(data), 1, quantities_of(built), built.scenario.run.duration, **options
+            sp.Experiment(data), 1, known, built.scenario.run.duration, **options
         )
 
     return read_data
@@ -50,21 +52,21 @@ def test_units_empty_cells_and_comments(read):
         f" t[ms] ,{HEIGHT} [mm],pairs.tip.normal_force [kN],pairs.tip.normal_force.sigma [N]\n"
         "\n0,17,,\n1,16.5,0.001,2\n# pause\n2,,0.002,3\n"
     )
-    assert found.name == "data"
-    np.testing.assert_allclose(found.t, [0.0, 1e-3, 2e-3])
-    height, force = found.columns
+    height, force = found
+    assert height.experiment == "data"
     assert (height.name, force.name) == (HEIGHT, "pairs.tip.normal_force")
-    np.testing.assert_allclose(height.values, [0.017, 0.0165])
-    assert height.rows.tolist() == [0, 1]
-    assert height.sigma is None
-    np.testing.assert_allclose(force.values, [1.0, 2.0])
+    np.testing.assert_allclose(height.t, [0.0, 1e-3])
+    np.testing.assert_allclose(height.measured, [0.017, 0.0165])
+    assert (height.given, force.given) == (False, True)
+    np.testing.assert_allclose(force.t, [1e-3, 2e-3])
+    np.testing.assert_allclose(force.measured, [1.0, 2.0])
     np.testing.assert_allclose(force.sigma, [2.0, 3.0])
 
 
 def test_columns_may_be_chosen(read):
     text = f"t [s],{HEIGHT} [m],remark [1]\n0,1,7\n"
-    (column,) = read(text, only=[HEIGHT]).columns
-    assert column.values.tolist() == [1.0]
+    (column,) = read(text, only=[HEIGHT])
+    assert column.measured.tolist() == [1.0]
     with pytest.raises(NameNotFound, match="no column 'depth'"):
         read(text, only=["depth"])
 
@@ -138,9 +140,9 @@ def test_wrong_columns_get_a_sentence(read, columns, said):
 
 
 def test_nan_is_no_value(read):
-    (column,) = read({"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [math.nan, 1.0]}).columns
-    assert column.rows.tolist() == [1]
-    assert column.values.tolist() == [1.0]
+    (column,) = read({"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [math.nan, 1.0]})
+    assert column.t.tolist() == [0.1]
+    assert column.measured.tolist() == [1.0]
 
 
 def test_no_file_gets_a_sentence(built, tmp_path):

@@ -32,12 +32,6 @@ def report(folder, error=None):
     return folder
 
 
-def test_a_column_that_begins_with_nothing_is_what_its_first_value_is():
-    rows = [(None, None, 1.0), ("a", 2.0, None)]
-    table = Table("t", "", [Column(key, key) for key in "abc"], rows)
-    assert table.numeric == [False, True, True]
-
-
 def test_blocks_are_tables_of_markdown(quote, tmp_path):
     blocks = quote.blocks_of(quote.read(report(tmp_path / "report") / "report.json"))
     assert "| who | s |\n| --- | --- |\n| a\\|b | 43.8 |\n" in blocks["times"]

@@ -130,13 +130,16 @@ def test_a_run_that_kills_its_workers_is_given_up_in_a_script_without_a_guard(tm
 def test_done_runs_are_not_done_again_and_a_table_grows(scenario, tmp_path):
     out, calls = tmp_path / "table.parquet", []
     sweep(scenario, {STIFFNESS: [1e4, 3e4]}, workers=0, out=out)
-    report = run_plan(plan_sweep(scenario, SMALL), workers=0, out=out)
-    assert (report.resumed, len(report.table)) == (2, 4)
+    table = run_plan(
+        plan_sweep(scenario, SMALL), workers=0, out=out, progress=lambda *one: calls.append(one)
+    )
+    assert (calls[0], len(table)) == ((2, 0, 4), 4)
+    calls.clear()
     whole = out.read_bytes()
     sweep(scenario, SMALL, workers=0, out=out, progress=lambda *counts: calls.append(counts))
     assert calls == [(4, 0, 4)]
     assert out.read_bytes() == whole
-    pd.testing.assert_frame_equal(pd.read_parquet(out), report.table, check_dtype=False)
+    pd.testing.assert_frame_equal(pd.read_parquet(out), table, check_dtype=False)
     fresh = tmp_path / "fresh.parquet"
     sweep(scenario, SMALL, workers=0, out=fresh)
     assert fresh.read_bytes() == whole
@@ -149,9 +152,10 @@ def test_a_failed_run_is_a_row_that_says_why(scenario, tmp_path):
     assert "starts at depth" in table["error"][1]
     assert str(scenario.parent) not in table["error"][1]
     assert table["figures.depth"].isna().tolist() == [False, True, False]
-    again = run_plan(plan_sweep(scenario, RADII), workers=0, out=out)
-    assert again.resumed == 2
-    pd.testing.assert_frame_equal(again.table, table)
+    calls = []
+    again = sweep(scenario, RADII, workers=0, out=out, progress=lambda *one: calls.append(one))
+    assert calls[0] == (2, 0, 3)
+    pd.testing.assert_frame_equal(again, table)
 
 
 def test_what_would_be_lost_or_mixed_is_refused(tmp_path):

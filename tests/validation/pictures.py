@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin.plot.figure import png as png_of
-from sphshell_pin.study.report import drawing
+from tests.validation import drawing
 
 COLORS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.VIOLET, drawing.RED)
 MARKS = ("o", "s", "^", "D", "v")

@@ -116,6 +116,23 @@ class AtomicFolder:
         inside.mkdir()
         return inside
 
+    def write(self, files: Iterable[tuple[str, bytes]], old: Iterable[str]) -> list[str]:
+        """Write `files`, names and contents, in place of `old`, see `replace`; return their names.
+
+        Raises ResultError where they cannot be written; the old ones stay.
+        """
+        names = []
+        try:
+            staging = self.staging()
+            for name, content in files:
+                (staging / name).write_bytes(content)
+                names.append(name)
+            self.replace(staging, old)
+        except OSError as error:
+            reason = f"cannot be written: {error.strerror or error}"
+            raise ResultError(self._folder, reason) from error
+        return names
+
     def replace(self, staging: Path, old: Iterable[str]) -> None:
         """Replace the files called `old` by all files of the `staging`; other files stay.
 
@@ -297,14 +314,6 @@ def write_folder(
     `every` are the names of all that an earlier call may have left there, which are replaced; the
     first of them is written in any case. ResultError where the folder cannot be written.
     """
-    folder = Path(folder)
-    with held_folder(folder, every[0]) as place:
-        try:
-            staging, names = place.staging(), []
-            for name, content in files.items() if isinstance(files, Mapping) else files:
-                (staging / name).write_bytes(content)
-                names.append(name)
-            place.replace(staging, every)
-        except OSError as error:
-            raise ResultError(folder, f"cannot be written: {error.strerror or error}") from error
-    return [folder / name for name in names]
+    with held_folder(Path(folder), every[0]) as place:
+        given = files.items() if isinstance(files, Mapping) else files
+        return [Path(folder) / name for name in place.write(given, every)]

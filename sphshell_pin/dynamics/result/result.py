@@ -184,13 +184,14 @@ class Result(Summarized):
         pandas = import_extra("pandas", "tables", "Result.to_dataframe")
         return pandas.DataFrame(self.contact_columns())
 
-    def row_columns(self, scene: Scene | None = None) -> dict[str, ArrayLike]:
+    def row_columns(self, scene: Scene | None = None) -> dict[str, Array]:
         """Return the rows as named scalar columns, units in the names (for CSV, tables).
 
         They are t, q and v by joint (q.JOINT, and q.JOINT.0, ... of a joint with several numbers),
-        and of each pair the sum of the normal forces, the total force on the sphere in the world
-        and the largest depth, zero without contact. `scene` names the joints (default: the one that
-        ran); without any, coordinates are q.0, q.1, ... without units.
+        and of each pair the sum of the normal forces, the size of that of the friction forces, the
+        total force on the sphere in the world and the largest depth, zero without contact. `scene`
+        names the joints (default: the one that ran); without any, coordinates are q.0, q.1, ...
+        without units.
         """
         return result_columns.row_columns(self, self.scene if scene is None else scene)
 

@@ -66,16 +66,17 @@ def state_titles(result: Result, scene: Scene | None) -> tuple[list[str], list[s
     return [f"q.{k}" for k in range(in_q)], [f"v.{k}" for k in range(in_v)]
 
 
-def row_columns(result: Result, scene: Scene | None) -> Columns:
+def row_columns(result: Result, scene: Scene | None) -> dict[str, Array]:
     """Return the rows as columns; see `Result.row_columns`."""
     in_q, in_v = state_titles(result, scene)
-    columns: Columns = {column("t", "s"): result.t}
+    columns = {column("t", "s"): result.t}
     columns |= dict(zip(in_q, result.q.T, strict=True))
     columns |= dict(zip(in_v, result.v.T, strict=True))
     for index in range(len(result.pairs)):
         pair = PairSeries.of(result, index)
         name = f"pairs.{pair.name}"
         columns[column(f"{name}.normal_force", "N")] = pair.normal
+        columns[column(f"{name}.friction_force", "N")] = pair.friction
         for axis, values in zip("xyz", pair.force_world.T, strict=True):
             columns[column(f"{name}.force_{axis}", "N")] = values
         columns[column(f"{name}.depth", "m")] = pair.depth

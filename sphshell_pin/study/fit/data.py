@@ -3,8 +3,9 @@
 import csv
 import math
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
@@ -17,7 +18,6 @@ from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
 from sphshell_pin.study.fit.units import factor_to_si
-from sphshell_pin.study.quantities import Quantity
 
 Source = str | PathLike[str] | Mapping[str, ArrayLike]
 
@@ -43,64 +43,62 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class Column:
-    """A measured quantity: `values` (m,) in its SI `unit` at the `rows` (m,) of the times.
+class Series:
+    """One measured column of one experiment, and what the fitted scenario says: all (m,).
 
-    `sigma` (m,) are the standard deviations that were given; None: to be estimated.
+    `t` are times [s]; values are in the SI `unit`; `sigma` are the standard deviations that
+    weighted them; `given` whether the data came with these.
     """
 
-    quantity: Quantity
-    rows: NDArray[np.intp]
-    values: Array
-    sigma: Array | None
+    experiment: str
+    name: str
+    unit: str
+    t: Array
+    measured: Array
+    fitted: Array
+    sigma: Array
+    given: bool
 
     @property
-    def name(self) -> str:
-        """Name of the quantity."""
-        return self.quantity.name
+    def residuals(self) -> Array:
+        """Measured less fitted values (m,), in `unit`."""
+        return self.measured - self.fitted
 
-
-@dataclass(frozen=True)
-class Measured:
-    """The data of one experiment: times `t` (n,) [s] and columns."""
-
-    name: str
-    t: Array
-    columns: tuple[Column, ...]
+    @property
+    def rms(self) -> float:
+        """Root of the mean square of the residuals, in `unit`."""
+        return float(np.sqrt(np.mean(self.residuals**2)))
 
 
 @dataclass(frozen=True)
 class _Table:
-    """Columns (n,) by their headers; `lines` (n,) of the file, if it is one."""
+    """Columns `values` (columns, rows) with their `titles`; `lines` (rows,) of the file."""
 
     source: str
-    columns: dict[str, Array]
-    lines: list[int] | None = None
+    titles: Sequence[str]
+    values: Array
+    lines: Sequence[int] = ()
 
-    @property
-    def headers(self) -> dict[str, str]:
-        """The headers by the names in them."""
-        out: dict[str, str] = {}
-        for header in self.columns:
-            name = quantity_of(header.strip())[0].strip()
-            if name in out:
+    @cached_property
+    def names(self) -> dict[str, int]:
+        """The numbers of the columns by the names in their titles."""
+        out: dict[str, int] = {}
+        for number, title in enumerate(self.titles):
+            if out.setdefault(name := quantity_of(title)[0].strip(), number) != number:
                 raise self.fault(f"two columns are called '{name}'")
-            out[name] = header
         return out
 
-    def values(self, name: str, unit: str) -> Array:
+    def column(self, name: str, unit: str) -> Array:
         """Return the values (n,) of a column in the SI `unit`."""
-        header = self.headers[name]
-        values, stated = self.columns[header], header.strip()
+        title, values = self.titles[self.names[name]], self.values[self.names[name]]
         hint = "" if name == TIME else "; put nan where nothing was measured"
-        self.check(
-            np.isinf(values), values, f"'{{:g}}' in column '{stated}' is not a finite number{hint}"
-        )
-        too_large = f"{{:g}} in column '{stated}' is too large to compute with"
+        infinite = f"'{{:g}}' in column '{title}' is not a finite number{hint}"
+        self.check(np.isinf(values), values, infinite)
+        too_large = f"{{:g}} in column '{title}' is too large to compute with"
         self.check(np.abs(values) > _LARGEST, values, too_large)
+        given = quantity_of(title)[1] if "[" in title else None
         try:
-            given = quantity_of(stated)[1] if "[" in stated else None
-            return values * factor_to_si(name, given, unit)
+            return np.asarray(values * factor_to_si(name, given, unit))
         except InvalidParameter as fault:
             raise self.fault(str(fault)) from None
 
@@ -110,22 +108,21 @@ class _Table:
             raise self.fault(reason.format(values[row], values[row - 1]), int(row))
 
     def fault(self, reason: str, row: int | None = None) -> DataError:
-        if row is not None and self.lines is None:
-            return DataError(self.source, f"row {row}: {reason}")
-        return DataError(self.source, reason, None if row is None else (self.lines or [])[row])
+        if row is None or self.lines:
+            return DataError(self.source, reason, None if row is None else self.lines[row])
+        return DataError(self.source, f"row {row}: {reason}")
 
 
 def read_experiment(
     experiment: Experiment,
     number: int,
-    known: Mapping[str, Quantity],
+    known: Mapping[str, str],
     duration: float,
-    *,
     only: Collection[str] | None = None,
-) -> Measured:
-    """Return the checked data of an experiment whose run lasts `duration` [s].
+) -> list[Series]:
+    """Return the checked columns of an experiment whose run lasts `duration` [s].
 
-    `known` are the quantities that can be measured, `only` the columns to take (None: all).
+    `known` are the units of what can be measured, by name, `only` the columns to take (None: all).
 
     Raises
     ------
@@ -138,10 +135,10 @@ def read_experiment(
     else:
         name = experiment.name or f"experiment {number}"
         table = _take_columns(given, name)
-    if TIME not in table.headers:
-        named = ", ".join(table.headers) or "none"
+    if TIME not in table.names:
+        named = ", ".join(table.names) or "none"
         raise table.fault(f"has no column '{TIME} [s]'; its columns are: {named}")
-    t = table.values(TIME, "s")
+    t = table.column(TIME, "s")
     if not len(t):
         raise table.fault("has no rows of data")
     steps = np.diff(t, prepend=-np.inf)
@@ -152,11 +149,11 @@ def read_experiment(
     table.check(steps < 0.0, t, f"time {{:.9g}} s is before {must}")
     table.check(t < 0.0, t, "time {:.9g} s is before the start of the run, which is at 0")
     table.check(t > duration * (1 + _ROUNDED), t, f"time {{:.9g}} s is after {end}")
-    measured = [label for label in table.headers if label != TIME]
+    measured = [label for label in table.names if label != TIME]
     for label in only or ():
         if label not in measured:
             raise NameNotFound("column", label, table.source, measured)
-    columns = []
+    series = []
     for label in measured:
         base = label.removesuffix(SIGMA)
         if base != label and label not in known:
@@ -166,43 +163,43 @@ def read_experiment(
             if label not in known:
                 unknown = NameNotFound("quantity", label, "a run of this scenario", known)
                 raise table.fault(str(unknown))
-            columns.append(_column(table, known[label]))
-    if not columns:
+            series.append(_series(table, name, label, known[label], np.minimum(t, duration)))
+    if not series:
         raise table.fault(f"has no column of data beside the time, as in '{_EXAMPLE}'")
-    return Measured(name, np.minimum(t, duration), tuple(columns))
+    return series
 
 
-def _column(table: _Table, quantity: Quantity) -> Column:
-    name = quantity.name
-    values = table.values(name, quantity.unit)
+def _series(table: _Table, experiment: str, name: str, unit: str, t: Array) -> Series:
+    values = table.column(name, unit)
     rows = np.flatnonzero(~np.isnan(values))
     if not len(rows):
         raise table.fault(f"column '{name}' has no value")
-    given = None
-    if name + SIGMA in table.headers:
-        given = table.values(name + SIGMA, quantity.unit)
-        usable = (given >= 1 / _LARGEST) & (given <= _LARGEST)
+    sigma, given = np.ones(len(t)), name + SIGMA in table.names
+    if given:
+        sigma = table.column(name + SIGMA, unit)
+        usable = np.isnan(values) | (sigma >= 1 / _LARGEST) & (sigma <= _LARGEST)
         must = f"must be positive wherever '{name}' has a value, and not too small to compute with"
-        table.check(~np.isnan(values) & ~usable, given, f"'{name}{SIGMA}' {must}")
-    return Column(quantity, rows, values[rows], None if given is None else given[rows])
+        table.check(~usable, sigma, f"'{name}{SIGMA}' {must}")
+    mean = np.full(len(rows), values[rows].mean())
+    return Series(experiment, name, unit, t[rows], values[rows], mean, sigma[rows], given)
 
 
 def _take_columns(given: Mapping[str, ArrayLike], name: str) -> _Table:
     try:
         # What is masked was not measured.
         columns = {
-            str(key): np.ma.filled(np.ma.array(value, dtype=np.float64), math.nan)
-            for key, value in dict(given).items()
+            str(key).strip(): np.ma.filled(np.ma.array(value, dtype=np.float64), math.nan)
+            for key, value in given.items()
         }
-    except (TypeError, ValueError) as fault:
+    except (AttributeError, TypeError, ValueError, OverflowError):
         raise DataError(
-            name, f"must be a csv file, or a mapping from headers to columns of numbers ({fault})"
+            name, f"must be a csv file, or a mapping from headers to columns of numbers: {_EXAMPLE}"
         ) from None
     shapes = {one.shape for one in columns.values()}
     if len(shapes) > 1 or any(len(shape) != 1 for shape in shapes):
         shown = ", ".join(f"'{key}' {one.shape}" for key, one in columns.items())
         raise DataError(name, f"columns must be of one length, of shape (n,): {shown}")
-    return _Table(name, columns)
+    return _Table(name, list(columns), np.array(list(columns.values())))
 
 
 def _read_csv(path: Path) -> _Table:
@@ -229,23 +226,21 @@ def _read_csv(path: Path) -> _Table:
         raise DataError(source, reason, first)
     if all(_number(one) is not None for one in head):
         raise DataError(source, f"the first line must be a header, as '{_EXAMPLE}'", first)
-    head = [re.sub(r"\s*(\[[^\[\]]*\])$", r" \1", one.strip()) for one in head]  # t[s] is t [s]
-    if len(set(head)) < len(head):
-        raise DataError(source, "two columns are called the same", first)
-    values = np.full((len(rows), len(head)), math.nan)
+    titles = [re.sub(r"\s*(\[[^\[\]]*\])$", r" \1", one.strip()) for one in head]  # t[s] is t [s]
+    values = np.full((len(titles), len(rows)), math.nan)
     for k, (number, row) in enumerate(zip(numbers, rows, strict=True)):
         if len(row) != len(head):
             reason = f"has {len(row)} values, the header has {len(head)} columns"
             raise DataError(source, reason, number)
-        for i, (cell, title) in enumerate(zip(row, head, strict=True)):
+        for i, cell in enumerate(row):
             found = _number(cell) if cell.strip() else math.nan
             if found is None:
-                reason = f"'{cell.strip()}' in column '{title}' is not a finite number"
-                timed = quantity_of(title)[0] == TIME
+                timed = quantity_of(titles[i])[0] == TIME
                 hint = "" if timed else "; leave the cell empty where nothing was measured"
-                raise DataError(source, reason + hint, number)
-            values[k, i] = found
-    return _Table(source, dict(zip(head, values.T, strict=True)), numbers)
+                reason = f"'{cell.strip()}' in column '{titles[i]}' is not a finite number{hint}"
+                raise DataError(source, reason, number)
+            values[i, k] = found
+    return _Table(source, titles, values, numbers)
 
 
 def _number(text: str) -> float | None:

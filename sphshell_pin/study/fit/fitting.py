@@ -1,19 +1,21 @@
 """Fits parameters of a scenario to measured data."""
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format import reading
-from sphshell_pin.scenario.format.build import Built, build_scenario
+from sphshell_pin.scenario.format.build import build_scenario
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.format.sliders import check_knobs
 from sphshell_pin.study.fit.data import Experiment, Source, read_experiment
 from sphshell_pin.study.fit.parameters import Free, Wanted, free_parameters
 from sphshell_pin.study.fit.report import Fit
 from sphshell_pin.study.fit.search import Progress, Search, Trial
-from sphshell_pin.study.quantities import quantities_of
 
 Data = Source | Experiment | Sequence[Source | Experiment]
 
@@ -36,9 +38,9 @@ def fit(
     data : a csv file, columns by their headers, an Experiment, or a sequence of these. A header is
         a name with its unit: "t [s]", "pairs.PAIR.normal_force [N]", "q.JOINT [rad]". A column
         "NAME.sigma" has the standard deviations of NAME; others are estimated from the residuals
-    parameters : keys such as "contact.tip.law.stiffness", or a mapping from keys to ranges
-        (low, high) that the values must stay in (None: the bounds of the key). The scenario's
-        values are where the search starts
+    parameters : keys such as "contact.tip.law.stiffness", KEY=LO:HI with a range that the value
+        must stay in, or a mapping from keys to ranges (low, high) (None: the bounds of the key).
+        The scenario's values are where the search starts
     changes : values by dotted key that differ from the file's in all experiments
     columns : names of the columns to use; by default all
     level : probability of the intervals
@@ -82,7 +84,6 @@ def _trials(
     if not given:
         raise InvalidParameter("data", [], "must be at least one csv file or experiment")
     trials: list[Trial] = []
-    reuse: Built | None = None
     for number, one in enumerate(given, 1):
         experiment = one if isinstance(one, Experiment) else Experiment(one)
         texts = {key: str(value) for key, value in experiment.changes.items()}
@@ -91,16 +92,13 @@ def _trials(
                 raise InvalidParameter(key, text, "is fitted, so no experiment can set it")
         scenario = reading.change_scenario(base, texts, path) if texts else base
         check_knobs(scenario, path, ranges=False)
-        built = reuse = build_scenario(scenario, path, reuse)
-        known = quantities_of(built)
-        read = read_experiment(experiment, number, known, scenario.run.duration, only=columns)
-        trials.append(Trial(built, read))
-    size = sum(len(column.values) for trial in trials for column in trial.data.columns)
+        trial = Trial(build_scenario(scenario, path, trials[-1].built if trials else None))
+        known = {name: unit for name, (unit, _) in trial.measure(np.zeros(1)).items()}
+        series = read_experiment(experiment, number, known, scenario.run.duration, columns)
+        trials.append(replace(trial, data=series))
+    size = sum(len(one.t) for trial in trials for one in trial.data)
     if size <= len(free):
-        raise InvalidParameter(
-            "data",
-            size,
-            f"must be more than parameters, of which there are {len(free)}",
-            given=f"with {size} value{'s' * (size != 1)}",
-        )
+        must = f"must be more than parameters, of which there are {len(free)}"
+        given_as = f"with {size} value{'s' * (size != 1)}"
+        raise InvalidParameter("data", size, must, given=given_as)
     return trials

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from sphshell_pin.base.parameters import Parameter
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario.format.reading import change_scenario, look_up
 from sphshell_pin.scenario.format.schema import Scenario
@@ -23,30 +22,19 @@ _NOT_MEASURED = ("run", "knob", "figures", "expect")
 
 @dataclass(frozen=True)
 class Free:
-    """A number of a scenario that is fitted; `others` are keys that always have its value, too.
+    """A number of a scenario that is fitted; all `keys` have its value.
 
     The search moves x: the logarithm of the value of one that must be positive (`log`), else the
     value over `scale`. `low` and `high` bound the value.
     """
 
-    key: str
+    keys: tuple[str, ...]
     unit: str
     start: float
     low: float
     high: float
     log: bool
-    scale: float = 1.0
-    others: tuple[str, ...] = ()
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """All keys that have the value."""
-        return (self.key, *self.others)
-
-    @property
-    def name(self) -> str:
-        """The keys as the caller gives them."""
-        return TIE.join(self.keys)
+    scale: float
 
     def to_x(self, value: float) -> float:
         """Return x at a value."""
@@ -66,7 +54,10 @@ class Free:
 
 
 def free_parameters(wanted: Wanted, scenario: Scenario, path: Path) -> tuple[Free, ...]:
-    """Return what is fitted: `wanted` are keys, or keys with a range (None: that of the key).
+    """Return what is fitted.
+
+    `wanted` are keys, texts KEY=LO:HI, or keys with a range (None: that of the key); in KEY+KEY
+    both have one value, within the bounds of both.
 
     Raises
     ------
@@ -77,44 +68,34 @@ def free_parameters(wanted: Wanted, scenario: Scenario, path: Path) -> tuple[Fre
     """
     if isinstance(wanted, str):
         wanted = [wanted]
-    ranges = dict(wanted) if isinstance(wanted, Mapping) else dict.fromkeys(wanted)
-    if not ranges:
+    stated = wanted.items() if isinstance(wanted, Mapping) else map(_stated, wanted)
+    free = []
+    for names, span in stated:
+        several = [_free(key.strip(), span, scenario, path) for key in names.split(TIE)]
+        if len({one.unit for one in several}) > 1:
+            units = " and ".join(f"[{one.unit}]" for one in several)
+            must = f"must have one unit to have one value: {units}"
+            raise InvalidParameter("parameters", names, must)
+        keys = tuple(key for one in several for key in one.keys)
+        low, high = max(one.low for one in several), min(one.high for one in several)
+        free.append(replace(several[0], keys=keys, low=low, high=high))
+    keys = tuple(key for one in free for key in one.keys)
+    if not keys:
         raise InvalidParameter("parameters", [], "must name at least one key of the scenario")
-    free = [_tied(key, span, scenario, path) for key, span in ranges.items()]
-    keys = [key for one in free for key in one.keys]
     for key in keys:
         if keys.count(key) > 1:
             raise InvalidParameter("parameters", key, "is given twice")
     return tuple(free)
 
 
-def parse_wanted(texts: Iterable[str]) -> dict[str, Range | None]:
-    """Return the keys and ranges that texts such as "KEY" and "KEY=LO:HI" state."""
-    out: dict[str, Range | None] = {}
-    for text in texts:
-        key, equals, span = text.partition("=")
-        key = key.strip()
-        if key in out:
-            raise InvalidParameter("--param", text, "is given twice")
-        out[key] = None
-        if equals:
-            try:
-                low, high = map(float, span.split(":"))
-            except ValueError:
-                raise InvalidParameter("--param", text, "must be KEY or KEY=LO:HI") from None
-            out[key] = low, high
-    return out
-
-
-def _tied(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
-    """Return the parameter of "KEY" or "KEY+KEY": one value for all, within the bounds of all."""
-    first, *others = (_free(one.strip(), span, scenario, path) for one in key.split(TIE))
-    for one in others:
-        if one.unit != first.unit:
-            must = f"must have one unit to have one value: [{first.unit}] and [{one.unit}]"
-            raise InvalidParameter("parameters", key, must)
-    low, high = max(one.low for one in (first, *others)), min(one.high for one in (first, *others))
-    return replace(first, low=low, high=high, others=tuple(one.key for one in others))
+def _stated(text: str) -> tuple[str, Range | None]:
+    """Return the key and the range of a text such as "KEY" and "KEY=LO:HI"."""
+    key, equals, span = text.partition("=")
+    try:
+        low, high = map(float, span.split(":")) if equals else (0.0, 0.0)
+    except ValueError:
+        raise InvalidParameter("parameters", text, "must be KEY or KEY=LO:HI") from None
+    return key, (low, high) if equals else None
 
 
 def _free(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
@@ -135,42 +116,25 @@ def _free(key: str, span: Range | None, scenario: Scenario, path: Path) -> Free:
             if "integer" in str(fault):
                 reason = "is a whole number, so it cannot be fitted"
                 raise ScenarioError(path, key, reason) from None
-    value = float(value)
-    about = meaning(scenario, found)
-    low, high = _bounds(about)
-    if span is not None:
-        if not span[0] < span[1] or not all(map(math.isfinite, span)):
-            raise InvalidParameter(key, f"{span[0]:g}:{span[1]:g}", "must be a range low:high")
-        for end in span:
-            about.check(key, end)
-        low, high = span
+    value, about = float(value), meaning(scenario, found)
+    if span is None:
+        low = -math.inf if about.at_least is None else about.at_least
+        if about.above is not None:
+            # The smallest number that is accepted; a logarithm may come as near to 0 as it likes.
+            low = float(np.nextafter(about.above, math.inf)) if about.above else 1e-300
+        span = low, math.inf if about.at_most is None else about.at_most
+    elif not span[0] < span[1] or not all(map(math.isfinite, span)):
+        raise InvalidParameter(key, f"{span[0]:g}:{span[1]:g}", "must be a range low:high")
+    low, high = span
+    for end in filter(math.isfinite, span):
+        about.check(key, end)
+    how = f"give a start value by --set {key}=VALUE"
     if not low <= value <= high:
-        raise InvalidParameter(
-            key,
-            value,
-            f"must start within its range {low:g} to {high:g}: give a start value by --set "
-            f"{key}=VALUE",
-        )
+        must = f"must start within its range {low:g} to {high:g}: {how}"
+        raise InvalidParameter(key, value, must)
     log = about.above == 0.0 or low > 0.0
-    scale = abs(value)
-    if span is not None and not log:
-        scale = 0.5 * (high - low)
+    scale = 0.5 * (high - low) if math.isfinite(high - low) else abs(value)
     if not scale and not log:
-        raise InvalidParameter(
-            key,
-            value,
-            f"must not start at 0, which says nothing of its order of magnitude: give a start by "
-            f"--set {key}=VALUE, or a range, {key}=LO:HI",
-        )
-    return Free(found.key, about.unit, value, low, high, log, scale)
-
-
-def _bounds(about: Parameter) -> Range:
-    """Return the closed bounds of a description."""
-    low = -math.inf
-    if about.at_least is not None:
-        low = about.at_least
-    if about.above is not None:
-        # The smallest number that is accepted; a logarithm may come as near to 0 as it likes.
-        low = float(np.nextafter(about.above, math.inf)) if about.above else 1e-300
-    return low, math.inf if about.at_most is None else about.at_most
+        must = f"must not start at 0, which says nothing of its order of magnitude: {how}, or a "
+        raise InvalidParameter(key, value, f"{must}range, {key}=LO:HI")
+    return Free((found.key,), about.unit, value, low, high, log, scale)

@@ -17,6 +17,7 @@ from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.base.texts import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
+from sphshell_pin.study.fit.data import Series
 from sphshell_pin.study.fit.parameters import TIE
 from sphshell_pin.study.fit.writing import scenario_text
 
@@ -47,32 +48,14 @@ class Fitted:
     determined: bool
     at_bound: bool = False
 
-
-@dataclass(frozen=True)
-class Series:
-    """One measured column of one experiment, and what the fitted scenario says: all (m,).
-
-    `sigma` are the standard deviations that weighted it; `given` whether the data came with them.
-    """
-
-    experiment: str
-    name: str
-    unit: str
-    t: Array
-    measured: Array
-    fitted: Array
-    sigma: Array
-    given: bool
-
     @property
-    def residuals(self) -> Array:
-        """Measured less fitted values (m,), in `unit`."""
-        return self.measured - self.fitted
-
-    @property
-    def rms(self) -> float:
-        """Root of the mean square of the residuals, in `unit`."""
-        return float(np.sqrt(np.mean(self.residuals**2)))
+    def interval(self) -> str:
+        """The interval in words."""
+        if self.at_bound:
+            return "at its bound"
+        if math.isinf(self.low) and math.isinf(self.high):
+            return "not determined"
+        return f"{self.low:.5g} to {self.high:.5g}"
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,12 +130,13 @@ class Fit(Summarized):
         return write_whole(path, self.scenario_text(Path(path).parent, changes).encode())
 
     def scenario_text(self, folder: Path, changes: Mapping[str, str] | None = None) -> str:
-        """Return what `write_scenario` writes into a file in `folder`."""
-        source = find_scenario(self.scenario)
+        """Return what `write_scenario` writes into a file in `folder`, values in nine digits."""
         texts = {
-            key: file_number(one.value) for one in self.parameters for key in one.key.split(TIE)
+            key: repr(float(f"{one.value:.9g}"))
+            for one in self.parameters
+            for key in one.key.split(TIE)
         }
-        return scenario_text(source, {**(changes or {}), **texts}, folder)
+        return scenario_text(find_scenario(self.scenario), {**(changes or {}), **texts}, folder)
 
     def to_json(self) -> str:
         """Return everything but the values of the series, as JSON; null for infinite and nan."""
@@ -173,11 +157,14 @@ class Fit(Summarized):
         )
 
     def __str__(self) -> str:
-        """Return a line for each parameter, then the remarks."""
+        """Return a line for each parameter and each column of data, then the remarks."""
         lines = [
-            f"{one.key} = {one.value:.6g} {one.unit}".rstrip() + f"  {interval_text(one)}"
+            f"{one.key} = {one.value:.6g} {one.unit}".rstrip() + f"  {one.interval}"
             for one in self.parameters
         ]
+        for one in self.series:
+            rms = f"rms residual {one.rms:.4g} {one.unit}".rstrip()
+            lines.append(f"{one.name} of {one.experiment}: {len(one.t)} values, {rms}")
         return "\n".join([*lines, *self.remarks])
 
 
@@ -189,24 +176,24 @@ def remarks_on(
     dof: int,
 ) -> list[str]:
     """Return what is to be said of a fit; `together` are determined only together."""
-    groups = [" and ".join(fitted[k].key for k in some) for some in together if len(some) > 1]
-    out = [f"the data do not determine {names} separately" for names in groups]
+    groups = [some for some in together if len(some) > 1]
+    names = (" and ".join(fitted[k].key for k in some) for some in groups)
+    out = [f"the data do not determine {one} separately" for one in names]
     for k, one in enumerate(fitted):
         if one.at_bound:
             out.append(
                 f"{one.key} stands at its bound, {one.value:.6g} {one.unit}".rstrip()
                 + ": it has no interval, and those of others hold for it so"
             )
-        elif not one.determined and not any(len(some) > 1 and k in some for some in together):
+        elif not one.determined and not any(k in some for some in groups):
             why = "what was measured feels it no more than the error of the runs"
             if math.isfinite(one.low) or math.isfinite(one.high):
-                why = f"its interval, {interval_text(one)} {one.unit}".rstrip()
+                why = f"its interval, {one.interval} {one.unit}".rstrip()
                 why += ", leaves its order of magnitude open"
             out.append(f"the data do not determine {one.key}: {why}")
-        for i in range(k):
-            if correlation[k, i] ** 2 > SHARED:
-                pair = f"{fitted[i].key} and {one.key}"
-                out.append(f"{pair} are correlated, {correlation[k, i]:+.3f}")
+        for i in np.flatnonzero(correlation[k, :k] ** 2 > SHARED).tolist():
+            pair = f"{fitted[i].key} and {one.key}"
+            out.append(f"{pair} are correlated, {correlation[k, i]:+.3f}")
     if all(one.given for one in series):
         squares = sum(float(np.sum((one.residuals / one.sigma) ** 2)) for one in series)
         low, high = stats.chi2.ppf([0.5 * FALSE_ALARM, 1 - 0.5 * FALSE_ALARM], dof)
@@ -216,17 +203,3 @@ def remarks_on(
                 "that were given: these are wrong, or the scenario leaves something out"
             )
     return out
-
-
-def interval_text(one: Fitted) -> str:
-    """Return the interval of a parameter as a table shows it."""
-    if one.at_bound:
-        return "at its bound"
-    if math.isinf(one.low) and math.isinf(one.high):
-        return "not determined"
-    return f"{one.low:.5g} to {one.high:.5g}"
-
-
-def file_number(value: float) -> str:
-    """Return a fitted value as a file states it, with nine digits."""
-    return repr(float(f"{value:.9g}"))

@@ -2,14 +2,14 @@
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from scipy import optimize, stats
 
 import sphshell_pin as sp
-from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import (
     DataError,
@@ -20,10 +20,10 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 from sphshell_pin.scenario.format.build import Built, rebuild
-from sphshell_pin.study.fit.data import Measured
-from sphshell_pin.study.fit.parameters import Free
-from sphshell_pin.study.fit.report import Fit, Fitted, Series, remarks_on
-from sphshell_pin.study.quantities import row_step
+from sphshell_pin.study.fit.data import Series
+from sphshell_pin.study.fit.parameters import TIE, Free
+from sphshell_pin.study.fit.report import Fit, Fitted, remarks_on
+from sphshell_pin.study.quantities import quantities_of, row_step
 
 Progress = Callable[[int, float], object]
 
@@ -40,7 +40,43 @@ class Trial:
     """An experiment ready to run: its scenario as `built`, and its data."""
 
     built: Built
-    data: Measured
+    data: Sequence[Series] = ()
+
+    def measure(
+        self,
+        t: Array,
+        changes: Mapping[str, str] | None = None,
+        wanted: Collection[str] | None = None,
+    ) -> dict[str, tuple[str, Array]]:
+        """Return unit and values (n,) at the times `t` (n,) of what `quantities_of` finds."""
+        with warnings.catch_warnings():
+            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
+                warnings.simplefilter("ignore", kind)
+            built = rebuild(self.built, changes or {}, anew=True)
+            sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
+            result = sp.Simulation(built.scene, built.simulation.integrator, sensors).run(
+                built.q0,
+                built.v0,
+                float(t[-1]),
+                built.controller,
+                built.scenario.run.control_dt,
+                record_dt=row_step(t) or None,
+            )
+        return quantities_of(result, built.scene, t, wanted)
+
+    def predict(self, changes: Mapping[str, str]) -> Array:
+        """Return what a run with `changes` says of all data (N,)."""
+        t = np.unique(np.concatenate([one.t for one in self.data]))
+        found, parts = self.measure(t, changes, {one.name for one in self.data}), []
+        for one in self.data:
+            parts.append(found[one.name][1][np.searchsorted(t, one.t)])
+            for row in np.flatnonzero(np.isnan(parts[-1])):
+                raise DataError(
+                    one.experiment,
+                    f"no reading of '{one.name}' has arrived at {one.t[row]:.6g} s: the sensor's "
+                    "first one comes later",
+                )
+        return np.concatenate(parts)
 
 
 class Search:
@@ -55,36 +91,22 @@ class Search:
             for end in ("start", "low", "high")
         )
         self.x, self.converged = self.start, False
-        self._progress, self._misfit = progress, math.nan
-        self._known: dict[bytes, Array | SphshellError] = {}
-        columns = [(trial, column) for trial in trials for column in trial.data.columns]
-        self.measured = np.concatenate([column.values for _, column in columns])
-        sizes = [len(column.values) for _, column in columns]
-        self._parts = np.split(np.arange(len(self.measured)), np.cumsum(sizes)[:-1])
-        self._series = [
-            Series(
-                trial.data.name,
-                column.name,
-                column.quantity.unit,
-                trial.data.t[column.rows],
-                column.values,
-                np.full(len(column.values), column.values.mean()),
-                np.ones(len(column.values)) if column.sigma is None else column.sigma,
-                column.sigma is not None,
-            )
-            for trial, column in columns
-        ]
-        integrators = [trial.built.simulation.integrator for trial in trials]
-        found = [getattr(one, "rtol", _FIXED_STEP_TOLERANCE) for one in integrators]
-        self.tolerance = float(max(*found, _LEAST_TOLERANCE))
+        self._progress, self._misfit, self._known = progress, math.nan, dict[bytes, Array]()
+        self._series = [one for trial in trials for one in trial.data]
+        self.measured = np.concatenate([one.measured for one in self._series])
+        ends = np.cumsum([len(one.t) for one in self._series])
+        self._parts = np.split(np.arange(len(self.measured)), ends[:-1])
+        found = [getattr(one.built.simulation.integrator, "rtol", 0.0) for one in trials]
+        self.tolerance = max([one or _FIXED_STEP_TOLERANCE for one in found] + [_LEAST_TOLERANCE])
         self.sigma = self._pooled(np.concatenate([one.fitted for one in self._series]))
 
     def run(self) -> None:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
-        first = self._predict(self.x)
-        if isinstance(first, SphshellError):
-            first.add_note("this is the run at the start values")
-            raise first
+        try:
+            self._known[self.x.tobytes()] = self._run(self.x)
+        except SphshellError as fault:
+            fault.add_note("this is the run at the start values")
+            raise
         for _ in range(_MOST_ROUNDS):
             self._minimize()
             before, self.sigma = self.sigma, self._pooled(self._values(self.x))
@@ -103,9 +125,8 @@ class Search:
         error = np.maximum(np.abs(jacobian - further), rounding[:, None])
         # What cannot be felt stays where it was.
         felt = np.linalg.norm(jacobian, axis=0) > 2.0 * np.linalg.norm(error, axis=0)
-        back, here = np.where(felt, self.x, self.start), self._residuals(self.x)
-        there = self._residuals(back)
-        if there @ there <= (1.0 + 1e-6) * (here @ here):
+        back = np.where(felt, self.x, self.start)
+        if np.sum(self._residuals(back) ** 2) <= (1 + 1e-6) * np.sum(self._residuals(self.x) ** 2):
             self.x = back
         dof = len(self.measured) - len(self.free)
         factor = float(stats.t.ppf(0.5 + 0.5 * level, dof))
@@ -115,89 +136,48 @@ class Search:
         at_bound = felt & ((self.x <= self.low) | (self.x >= self.high))
         beyond = at_bound * np.linalg.lstsq(jacobian, self._residuals(self.x), rcond=None)[0]
         held = at_bound & (np.abs(beyond) > factor * np.sqrt(np.diag(covariance)))
-        free = np.flatnonzero(~held)
         if held.any():
-            covariance[np.ix_(free, free)], blind = covariance_of(jacobian[:, free], error[:, free])
-            covariance[held, held] = np.nan
-        deviations = np.sqrt(np.diag(covariance))
+            covariance, blind = covariance_of(np.where(held, 0.0, jacobian), error)
+        deviations = np.where(held, np.nan, np.sqrt(np.diag(covariance)))
+        with np.errstate(invalid="ignore"):
+            correlation = covariance / np.outer(deviations, deviations)
+        correlation[~np.isfinite(deviations)] = correlation[:, ~np.isfinite(deviations)] = np.nan
+        np.fill_diagonal(correlation, 1.0)
         columns = self.free, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
         fitted = tuple(_fitted(*one) for one in zip(*columns, strict=True))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            correlation = covariance / np.outer(deviations, deviations)
-        lost = ~np.isfinite(deviations)
-        correlation[lost], correlation[:, lost] = np.nan, np.nan
-        np.fill_diagonal(correlation, 1.0)
         values = self._values(self.x)
         series = tuple(
             replace(one, fitted=values[part], sigma=self.sigma[part])
             for one, part in zip(self._series, self._parts, strict=True)
         )
-        together = [free[members].tolist() for members in blind]
-        remarks = remarks_on(fitted, correlation, together, series, dof)
+        remarks = remarks_on(fitted, correlation, blind, series, dof)
         if not self.converged:
             remarks.insert(0, "the search ended before the residuals were least: start nearer")
-        return Fit(
-            scenario,
-            fitted,
-            correlation,
-            series,
-            tuple(remarks),
-            dof,
-            level,
-            self.count,
-            self.converged,
-        )
+        outcome = tuple(remarks), dof, level, self.count, self.converged
+        return Fit(scenario, fitted, correlation, series, *outcome)
 
-    def _predict(self, x: Array) -> Array | SphshellError:
-        """Return the predicted values (N,) at x, experiment by experiment, or why one fails."""
+    def _values(self, x: Array) -> Array:
+        """Return the predicted values (N,) at x, trial by trial; nan where a run fails."""
         key = x.tobytes()
         if key not in self._known:
             try:
-                self._known[key] = np.concatenate([self._run(trial, x) for trial in self.trials])
+                self._known[key] = self._run(x)
             except Interrupted:
                 raise
-            except SphshellError as failure:
-                self._known[key] = failure
+            except SphshellError:
+                self._known[key] = np.full(len(self.measured), np.nan)
         return self._known[key]
 
-    def _values(self, x: Array) -> Array:
-        """Return the predicted values (N,) at x, nan where a run fails."""
-        found = self._predict(x)
-        return np.full(len(self.measured), np.nan) if isinstance(found, SphshellError) else found
-
-    def _run(self, trial: Trial, x: Array) -> Array:
-        texts = {
-            key: one.text(value)
-            for one, value in zip(self.free, x.tolist(), strict=True)
-            for key in one.keys
-        }
-        t = trial.data.t
-        with warnings.catch_warnings():
-            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
-                warnings.simplefilter("ignore", kind)
-            built = rebuild(trial.built, texts, anew=True)
-            sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
-            result = sp.Simulation(built.scene, built.simulation.integrator, sensors).run(
-                built.q0,
-                built.v0,
-                float(t[-1]),
-                built.controller,
-                built.scenario.run.control_dt,
-                record_dt=row_step(t) or None,
-            )
-        self.count += 1
-        if self._progress is not None:
-            self._progress(self.count, self._misfit)
+    def _run(self, x: Array) -> Array:
+        texts = [one.text(value) for one, value in zip(self.free, x.tolist(), strict=True)]
+        pairs = zip(self.free, texts, strict=True)
+        changes = {key: text for one, text in pairs for key in one.keys}
         parts = []
-        for column in trial.data.columns:
-            values = column.quantity.at(result, t[column.rows])
-            for row in np.flatnonzero(np.isnan(values)):
-                raise DataError(
-                    trial.data.name,
-                    f"no reading of '{column.name}' has arrived at {t[column.rows[row]]:.6g} s: "
-                    "the sensor's first one comes later",
-                )
-            parts.append(values)
+        for trial in self.trials:
+            parts.append(trial.predict(changes))
+            self.count += 1
+            if self._progress is not None:
+                self._progress(self.count, self._misfit)
         return np.concatenate(parts)
 
     def _residuals(self, x: Array) -> Array:
@@ -226,7 +206,7 @@ class Search:
         # TRF stays inside: it says which bounds it was driven to.
         mask, inside = np.asarray(found.active_mask), start + np.asarray(found.x)
         ends = np.where(mask < 0, self.low, np.where(mask > 0, self.high, inside))
-        self.x = inside if isinstance(self._predict(ends), SphshellError) else ends
+        self.x = ends if np.isfinite(self._values(ends)).all() else inside
         self.converged = bool(found.status > 0)
 
     def _derivatives(self, x: Array, step: float, sides: int) -> Array:
@@ -249,22 +229,20 @@ class Search:
 
     def _pooled(self, values: Array) -> Array:
         """Return the given sigma, else the rms of the residuals of all columns of one name."""
-        count = len(self.measured)
-        factor = count / (count - len(self.free))
-        out = np.concatenate([one.sigma for one in self._series])
+        count, out = len(self.measured), np.concatenate([one.sigma for one in self._series])
         for name in {one.name for one in self._series if not one.given}:
             pairs = zip(self._series, self._parts, strict=True)
             same = np.concatenate(
                 [part for one, part in pairs if one.name == name and not one.given]
             )
+            squares = np.mean((self.measured - values)[same] ** 2) * count
             # Data without noise are as exact as a run.
             least = self.tolerance * float(np.abs(self.measured[same]).max())
-            rms = math.sqrt(factor * float(np.mean((self.measured - values)[same] ** 2)))
-            out[same] = max(rms, least) or 1.0
+            out[same] = max(math.sqrt(squares / (count - len(self.free))), least) or 1.0
         return np.asarray(out)
 
 
-def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[Longs]]:
+def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[list[int]]]:
     """Return what the Jacobian (N, p) of weighted residuals determines; `error` is its own error.
 
     That is the covariance (p, p), infinite on the diagonal of what it does not determine, and the
@@ -281,10 +259,8 @@ def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[Longs]]:
     if not len(felt):
         return covariance, []
     scale = lengths[felt]
-    # Rows of zeros, so that there are as many vectors as parameters.
-    rows = np.vstack((jacobian[:, felt] / scale, np.zeros((len(felt), len(felt)))))
-    _, values, vectors = np.linalg.svd(rows, full_matrices=False)
-    rounding = float(np.finfo(float).eps) * max(jacobian.shape) * float(values[0])
+    _, values, vectors = np.linalg.svd(jacobian[:, felt] / scale, full_matrices=False)
+    rounding = float(np.finfo(float).eps) * len(jacobian) * float(values[0])
     floor = max(float(np.linalg.norm(error[:, felt] / scale, 2)), rounding)
     seen = values > floor
     inner = (vectors[seen].T / values[seen] ** 2) @ vectors[seen] / np.outer(scale, scale)
@@ -293,7 +269,7 @@ def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[Longs]]:
     for some in members:
         inner[some, some] = math.inf
     covariance[np.ix_(felt, felt)] = inner
-    return covariance, [felt[some] for some in members]
+    return covariance, [felt[some].tolist() for some in members]
 
 
 def _quiet(sensor: Sensor) -> Sensor:
@@ -308,13 +284,13 @@ def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
     It is not determined if that interval leaves its order of magnitude open: if it reaches from one
     bound to the other, or, for one that is not negative, to 0 by its slope at the value.
     """
-    value = float(one.text(x))
+    name, value = TIE.join(one.keys), float(one.text(x))
     if not math.isfinite(half):
         held = math.isnan(half)
-        return Fitted(one.name, one.unit, one.start, value, -half, half, held, held)
+        return Fitted(name, one.unit, one.start, value, -half, half, held, held)
     low, high = one.to_value(x + beyond - half), one.to_value(x + beyond + half)
     # One that must be positive is searched by its logarithm: its relative deviation is that of x.
     from_zero = half < 1.0 if one.log else one.low != 0.0 or low > 0.0
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
-    return Fitted(one.name, one.unit, one.start, value, low, high, determined)
+    return Fitted(name, one.unit, one.start, value, low, high, determined)

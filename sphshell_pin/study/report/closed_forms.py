@@ -26,7 +26,6 @@ class Case:
     (n,): the error is the largest length of a difference. Fixed steps divide `record_dt` [s].
     """
 
-    name: str
     title: str
     scene: sp.Scene
     controller: AnyController = None
@@ -99,7 +98,6 @@ def bounces() -> Case:
     """Let a ball fall on an undamped spring, five times: parabolas and sines, joined."""
     stiffness = 1e4
     return Case(
-        name="bounces",
         title="Ball bounces five times",
         scene=ball_on_plate(sp.ImpactLaw(stiffness, 1.0), pin.JointModelPZ()),
         q0=np.array([RADIUS + FALL]),
@@ -131,7 +129,6 @@ def glide() -> Case:
         return np.stack([np.cos(omega * t), np.zeros_like(t), 1 + 0.5 * decay], axis=1)
 
     return Case(
-        name="glide",
         title="Ball glides on a stiff plate",
         scene=ball_on_plate(law, pin.JointModelTranslation()),
         controller=sp.JointPD([SPRING, 0, 0], 0.0, np.zeros(3), gravity_compensation=False),

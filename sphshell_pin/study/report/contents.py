@@ -1,14 +1,12 @@
-"""What was measured: findings with their bounds, pictures and tables, and sections of them.
+"""What was measured: findings with their bounds, tables, and sections of them.
 
 The report states its results in these, and so do the validation, the hard cases and the other
 engines of a checkout. A table is a csv file, an HTML table on the page and a Markdown table in the
-documents; a picture is a png file, which the page holds, too.
+documents.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +15,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.tables import csv_text
 
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""
@@ -152,22 +151,11 @@ class Table:
             for row in self.rows
         ]
 
-    @property
-    def numeric(self) -> list[bool]:
-        """Whether a column holds numbers."""
-        firsts = (
-            next((row[k] for row in self.rows if row[k] is not None), "")
-            for k in range(len(self.columns))
-        )
-        return [not isinstance(first, str) for first in firsts]
-
     def csv(self) -> str:
         """Return the table as csv, with all digits."""
-        stream = io.StringIO()
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([column.key for column in self.columns])
-        writer.writerows(self.rows)
-        return stream.getvalue()
+        keys = [column.key for column in self.columns]
+        cells = np.array(self.rows, dtype=object).reshape(-1, len(keys))
+        return csv_text(dict(zip(keys, cells.T, strict=True)))
 
     def markdown(self) -> str:
         """Return the table as Markdown."""
@@ -179,16 +167,6 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture as png, what it shows for those who cannot see it, and its caption."""
-
-    name: str
-    png: bytes
-    description: str
-    caption: str
-
-
-@dataclass(frozen=True)
 class Section:
     """One section of the page; `error` where it could not be measured, in one sentence."""
 
@@ -196,7 +174,6 @@ class Section:
     title: str
     text: str = ""
     findings: list[Finding] = field(default_factory=list)
-    pictures: list[Picture] = field(default_factory=list)
     tables: list[Table] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     error: str | None = None

@@ -19,8 +19,7 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.plot.figure import png as png_of
-from sphshell_pin.study.report import contents, drawing
+from sphshell_pin.study.report import contents
 from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Surface
 from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
 
@@ -102,13 +101,6 @@ def query_contestant(
 
 
 KEY, TITLE = "forces", "Error of the contact force"
-LOOKS = {
-    SMOOTH: (drawing.BLUE, "o"),
-    ESTIMATED: (drawing.GREEN, "s"),
-    "facets": (drawing.ORANGE, "^"),
-    "elements": (drawing.RED, "v"),
-}
-"""Color and marker."""
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
 TEXT = contents.about(__doc__)
@@ -121,13 +113,12 @@ def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     for k, name in enumerate(REPORTED):
         share = part(progress, k / len(REPORTED), (k + 1) / len(REPORTED))
         rows += measure(name, SURFACES[name], rounds, share, finest)
-    return assemble(REPORTED, rows)
+    return assemble(rows)
 
 
-def assemble(names: tuple[str, ...], rows: list[Row]) -> contents.Section:
+def assemble(rows: list[Row]) -> contents.Section:
     """Return the section of measured rows."""
-    tables = [orders_table(names, rows)]
-    return contents.Section(KEY, TITLE, TEXT, findings_of(rows), [picture(names, rows)], tables)
+    return contents.Section(KEY, TITLE, TEXT, findings_of(rows), [orders_table(rows)])
 
 
 def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
@@ -171,10 +162,10 @@ def findings_of(rows: list[Row]) -> list[contents.Finding]:
     ]
 
 
-def orders_table(names: tuple[str, ...], rows: list[Row]) -> contents.Table:
+def orders_table(rows: list[Row]) -> contents.Table:
     """Return order and error at h / r = AT of every method on every surface."""
     cells = []
-    for name, rule in product(names, LOOKS):
+    for name, rule in product(REPORTED, RULES):
         line = of(rows, name, rule)
         fine, exact = line[-1], max(row.largest for row in line) < 1e-12
         errors = error_at(line), error_at(line, "largest")
@@ -192,23 +183,3 @@ def orders_table(names: tuple[str, ...], rows: list[Row]) -> contents.Table:
         ),
         cells,
     )
-
-
-def picture(names: tuple[str, ...], rows: list[Row]) -> contents.Picture:
-    """Draw mean errors against the number of elements, one panel per surface."""
-    with drawing.canvas(7.8, 5.8) as figure:
-        panels = figure.subplots(2, 2, sharex=True).ravel()
-        for axis, name in zip(panels, names, strict=True):
-            axis.set_title(name)
-            for rule, (color, marker) in LOOKS.items():
-                line = of(rows, name, rule)
-                x, mean = [r.triangles for r in line], [r.mean for r in line]
-                axis.loglog(x, mean, color=color, marker=marker, label=rule)
-        panels[0].legend(fontsize=drawing.SMALL)
-        figure.supxlabel("elements")
-        figure.supylabel("mean error of the force / force")
-        png = png_of(figure, 160)
-    best = contents.number(error_at(of(rows, names[0], SMOOTH)))
-    what = "Mean error of the force against the number of elements"
-    at = f"; smooth reaches {best} on the {names[0]} at h/r = {AT}."
-    return contents.Picture("force_elements", png, what + at, f"{what}.")

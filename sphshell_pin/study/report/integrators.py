@@ -70,7 +70,7 @@ def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     for k, case in enumerate((closed_forms.bounces(), closed_forms.glide())):
         rows += measure(case, quick=quick)
         progress(0.45 * (k + 1))
-    swings = swing.measure(swing.mesh_scene(swing.bowl(0.15)), swing.reference_period())
+    swings = swing.measure(swing.mesh_scene(swing.bowl(0.15)))
     return assemble(rows, swings)
 
 

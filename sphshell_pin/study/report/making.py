@@ -1,6 +1,5 @@
 """Measure the sections one after another, and write the page and its tables."""
 
-import contextlib
 import dataclasses
 import json
 import os
@@ -15,15 +14,14 @@ from sphshell_pin.base.atomic import AtomicFolder
 from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.base.texts import json_text
-from sphshell_pin.errors import ResultError, SetupWarning, SphshellError, WeakLawWarning
-from sphshell_pin.plot.figure import new_figure
+from sphshell_pin.errors import SetupWarning, SphshellError, WeakLawWarning
 from sphshell_pin.study.report import convergence, integrators, queries, steps, timing
 from sphshell_pin.study.report.contents import Progress, Section, findings_table
 from sphshell_pin.study.report.machine import caution_of, describe
 from sphshell_pin.study.report.page import render
 
 PAGE, DATA = "report.md", "report.json"
-_OWN = (".csv", ".png")
+_OWN = (".csv", ".png")  # of earlier versions, too
 _STATED = ("key", "title", "error", "seconds", "notes")
 Tell = Callable[[str, float], None]
 """Called with the section's title and the share of all that is done."""
@@ -33,14 +31,13 @@ Tell = Callable[[str, float], None]
 class Part:
     """A section to be, of measure(quick=, progress=).
 
-    `seconds` it takes, about, with --quick and in full; `pinned` to a core.
+    `seconds` it takes, about, with --quick and in full.
     """
 
     key: str
     title: str
     measure: Callable[..., Section]
     seconds: tuple[float, float]
-    pinned: bool = True
 
 
 PARTS = (
@@ -82,12 +79,9 @@ def make_report(
 
     Raises
     ------
-    MissingExtra
-        Without matplotlib (the extra `view`).
     ResultError
         Where the folder cannot be written.
     """
-    new_figure(1.0, 1.0)  # raises now what would be raised at the end
     with held_folder(out, DATA) as place:
         report = _measure(parts or PARTS, quick, command, tell)
         _write(report, out, place)
@@ -124,7 +118,7 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
             # are measured with steps that are too long, too.
             for kind in (WeakLawWarning, SetupWarning):
                 warnings.simplefilter("ignore", kind)
-            with timing.on_one_core() if part.pinned else contextlib.nullcontext():
+            with timing.on_one_core():
                 section = part.measure(quick=quick, progress=progress)
     except KeyboardInterrupt:  # Interrupted is an Exception, too
         raise
@@ -138,16 +132,9 @@ def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
 def _write(report: Report, out: Path, place: AtomicFolder) -> None:
     """Write page, tables and data; all of them take the place of an earlier report's at once."""
     files = {f"{t.name}.csv": t.csv().encode() for s in report.sections for t in s.tables}
-    files |= {f"{one.name}.png": one.png for s in report.sections for one in s.pictures}
     files[DATA] = report_json(report, sorted(files)).encode()
     files[PAGE] = render(report.sections, report.machine, report.caution).encode()
-    try:
-        staging = place.staging()
-        for name, content in files.items():
-            (staging / name).write_bytes(content)
-        place.replace(staging, [PAGE, DATA, *_files_of_old(out)])
-    except OSError as error:
-        raise ResultError(out, f"cannot be written: {error.strerror or error}") from None
+    place.write(files.items(), [PAGE, DATA, *_files_of_old(out)])
 
 
 def _files_of_old(out: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""The page: Markdown, with the pictures and tables that stand beside it."""
+"""The page: Markdown, with the tables that stand beside it."""
 
 from sphshell_pin.study.report.contents import Section, findings_table
 
@@ -29,7 +29,6 @@ def render(sections: list[Section], machine: dict[str, str], caution: str = "") 
         if section.findings:
             parts.append(findings_table(section.findings).markdown())
         parts += section.notes
-        parts += [f"![{one.description}]({one.name}.png)" for one in section.pictures]
         for table in section.tables:
             parts += [f"{table.caption} [{table.name}.csv]({table.name}.csv)", table.markdown()]
     parts += ["## Machine and run", "\n".join(f"- {key}: {text}" for key, text in machine.items())]

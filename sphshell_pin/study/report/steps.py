@@ -17,7 +17,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.study.report import contents
 from sphshell_pin.study.report.surfaces import wavy_sheet
-from sphshell_pin.study.report.timing import measure_import, part, silent, take_turns
+from sphshell_pin.study.report.timing import silent, take_turns
 
 Times = dict[str, Array]
 DT, STEPS, RADIUS = 1e-5, 5000, 0.012
@@ -103,24 +103,19 @@ TEXT = contents.about(__doc__)
 
 def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section."""
-    steps = measure(8 if quick else 50, part(progress, 0.0, 0.9))
-    imports = measure_import(5 if quick else 15, part(progress, 0.9, 1.0))
-    return assemble(steps, imports)
+    return assemble(measure(8 if quick else 50, progress))
 
 
-def assemble(steps: Times, imports: Times) -> contents.Section:
+def assemble(steps: Times) -> contents.Section:
     """Return the section of what was measured."""
     bare, ratio = steps[BARE], contents.Finding.of_rounds
     touching = "Panda and fingertip touching 200 k triangles: whole step / bare ABA + integrate"
     control = "Panda with joint PD and gravity compensation: step touching / without any contact"
-    importing = "import sphshell_pin / import pinocchio, whole interpreter"
     controlled = steps[CONTROL_TOUCHING] / steps[CONTROL_FREE]
-    imported = imports["sphshell_pin"] / imports["pinocchio"]
     findings = [
         ratio("step_touching", touching, steps[TOUCHING] / bare, aim=1.8),
         ratio("step_far", "the same with the sphere far away", steps[FAR] / bare),
         ratio("step_control", control, controlled, aim=1.35),
-        ratio("import", importing, imported, aim=1.2),
     ]
     caption, over = "Whole steps, in turn in one process.", "over_bare: over ABA + integrate"
     whole = {name: steps[name] for name in WHOLE}

@@ -2,11 +2,8 @@
 
 import contextlib
 import os
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -62,18 +59,6 @@ def take_turns(
             times[name].append(run())
         progress((turn + 2) / (rounds + 1))
     return {name: np.array(t) for name, t in times.items()}
-
-
-def measure_import(rounds: int, progress: Progress = silent) -> dict[str, Array]:
-    """Return the times [s] of importing this package and Pinocchio in fresh interpreters."""
-
-    def fresh(module: str) -> float:
-        start = time.perf_counter()
-        subprocess.run([sys.executable, "-c", f"import {module}"], check=True)
-        return time.perf_counter() - start
-
-    modules = ("sphshell_pin", "pinocchio")
-    return take_turns({m: partial(fresh, m) for m in modules}, rounds, progress)
 
 
 def per_center(ask: Callable[[], object], count: int) -> Callable[[], float]:

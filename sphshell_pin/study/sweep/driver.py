@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
-from dataclasses import dataclass
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -17,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.errors import InvalidParameter, ResultError, SweepError, import_extra
 from sphshell_pin.study.sweep import worker
-from sphshell_pin.study.sweep.distributions import Dist
 from sphshell_pin.study.sweep.indices import DESIGN, figures_of
 from sphshell_pin.study.sweep.plan import Changes, Plan, plan_sweep
-from sphshell_pin.study.sweep.points import Vary, text_of
+from sphshell_pin.study.sweep.points import Dist, Vary, text_of
 from sphshell_pin.study.sweep.worker import Outcome
 
 if TYPE_CHECKING:
@@ -30,19 +28,8 @@ if TYPE_CHECKING:
 _SAVE_AFTER, _SAVE_SELDOM = 5.0, 20.0
 _CONNECT_TIMEOUT = 10.0
 Progress = Callable[[int, int, int], object]
-"""Called with the numbers of runs done, failed among them, and in all."""
+"""Called with the numbers of runs done, failed now among them, and in all; first before any run."""
 _need = partial(import_extra, extra="sweep", purpose="a sweep")
-
-
-@dataclass(frozen=True)
-class SweepReport:
-    """What a sweep left behind."""
-
-    table: pd.DataFrame
-    """A row for each run."""
-    resumed: int
-    """Runs that had been done before."""
-    failed: int
 
 
 def sweep(
@@ -107,16 +94,8 @@ def sweep(
     KeyboardInterrupt
         On Ctrl-C; its text says how many runs are done and kept.
     """
-    plan = plan_sweep(
-        scenario,
-        vary,
-        changes=changes,
-        dist=dist,
-        n=n,
-        seed=seed,
-        indices=indices,
-    )
-    return run_plan(plan, workers=workers, scheduler=scheduler, out=out, progress=progress).table
+    plan = plan_sweep(scenario, vary, changes=changes, dist=dist, n=n, seed=seed, indices=indices)
+    return run_plan(plan, workers=workers, scheduler=scheduler, out=out, progress=progress)
 
 
 def run_plan(
@@ -126,7 +105,7 @@ def run_plan(
     scheduler: str | None = None,
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
-) -> SweepReport:
+) -> pd.DataFrame:
     """Do what the table at `out` does not hold yet, and write the table; see `sweep`."""
     if scheduler is not None and workers is not None:
         raise InvalidParameter("workers", workers, "is for this machine: a scheduler has its own")
@@ -165,7 +144,7 @@ def run_plan(
     finally:
         if len(outcomes) > resumed:
             save()
-    return SweepReport(_table_of(plan, outcomes), resumed, failed)
+    return _table_of(plan, outcomes)
 
 
 def write_table(path: Path, table: pd.DataFrame) -> None:
@@ -187,25 +166,23 @@ def _table_of(plan: Plan, outcomes: Mapping[int, Outcome]) -> pd.DataFrame:
     """
     pandas, numbers = _need("pandas"), sorted(outcomes)
     rows = [outcomes[i] for i in numbers]
-    columns = {"run": pandas.Series(numbers, dtype="int64")}
-    for key, values in plan.points.values.items():
-        # Numbers where all values are, else texts.
-        whole = pandas.Series(values)
-        numeric = whole.dtype.kind in "bif"
-        columns[key] = whole[numbers] if numeric else pandas.Series(map(text_of, values))[numbers]
-    columns["status"] = pandas.Series(
-        ["failed" if one.error else "done" for one in rows], dtype=object
-    )
-    columns["error"] = pandas.Series([one.error for one in rows], dtype=object)
+    varied = pandas.DataFrame(plan.points.values)
+    for key, values in plan.points.values.items():  # numbers where all values are, else texts
+        if varied[key].dtype.kind not in "bif":
+            varied[key] = pandas.Series(map(text_of, values), dtype=object)
+    varied = varied.iloc[numbers].reset_index(drop=True)
+    varied.insert(0, "run", pandas.Series(numbers, dtype="int64"))
+    told = {"status": ["failed" if one.error else "done" for one in rows]}
+    told["error"] = [one.error for one in rows]
     if plan.points.parts:
-        columns[DESIGN] = pandas.Series([plan.points.parts[i] for i in numbers])
+        told[DESIGN] = [plan.points.parts[i] for i in numbers]
     others = {name for one in rows for name in one.figures} - set(plan.figures)
     figures = pandas.DataFrame(
         [one.figures for one in rows], columns=[*plan.figures, *sorted(others)], dtype=float
     )
-    columns = {name: one.reset_index(drop=True) for name, one in columns.items()}
     settings = pandas.Series([plan.digests[i] for i in numbers], dtype=object, name="settings")
-    frame: pd.DataFrame = pandas.concat([pandas.DataFrame(columns), figures, settings], axis=1)
+    parts = varied, pandas.DataFrame(told, dtype=object), figures, settings
+    frame: pd.DataFrame = pandas.concat(parts, axis=1)
     frame.attrs["units"] = {name: one for name, one in plan.units.items() if name in frame}
     return frame
 

@@ -38,19 +38,21 @@ def figures_of(table: pd.DataFrame) -> list[str]:
 
 
 def quantiles(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the quantiles of each figure of a sampled `table`.
+    """Return the quantiles of each input and each figure of a sampled `table`.
 
     Returns
     -------
-    pandas.DataFrame : a row for each figure, by its name: columns 5, 25, 50, 75, 95 [%, SI units],
-        `mean`, and `runs`, how many have the figure; failed runs are left out.
+    pandas.DataFrame : a row for each input and figure, by its name: columns 5, 25, 50, 75, 95
+        [%, inputs as the file states them, figures in SI units], `mean`, and `runs`, how many have
+        the figure; failed runs are left out.
 
     Raises
     ------
     InvalidParameter
         The table is not that of a sweep with `sample`.
     """
-    rows = _rows(table, DRAWN, "a sample: make the sweep with dist")[figures_of(table)]
+    names = varied_keys(table) + figures_of(table)
+    rows = _rows(table, DRAWN, "a sample: make the sweep with dist")[names]
     found = rows.quantile([one / 100 for one in QUANTILES]).T.set_axis(list(QUANTILES), axis=1)
     return found.assign(mean=rows.mean(), runs=rows.count())
 
@@ -103,7 +105,9 @@ def sobol_indices(
             figure,
             f"is {values.flat[0]:.6g} in all runs: without a variance it has no Sobol indices",
         )
-    found = import_extra("scipy.stats", "sweep", "Sobol indices").bootstrap(
+    from scipy import stats
+
+    found = stats.bootstrap(
         (np.arange(n),),
         lambda points, axis: _estimate(values[:, points]),
         vectorized=True,
@@ -159,6 +163,8 @@ def _estimate(values: Array) -> Array:
     d, many, n = len(values) - 2, values.shape[1:-1], values.shape[-1]
     a, b, *swaps = values.reshape(d + 2, -1, n)
     functions = {"f_A": a, "f_B": b, "f_AB": np.array(swaps)}
-    found = import_extra("scipy.stats", "sweep", "Sobol indices").sobol_indices(func=functions, n=n)
+    from scipy import stats
+
+    found = stats.sobol_indices(func=functions, n=n)
     both = np.stack([found.first_order, found.total_order]).reshape(2, -1, d)
     return np.moveaxis(both, 1, -1).reshape(2, d, *many)

@@ -25,8 +25,7 @@ from sphshell_pin.scenario.running.figures import (
     figure_units,
 )
 from sphshell_pin.scenario.running.run import versions
-from sphshell_pin.study.sweep.distributions import Dist
-from sphshell_pin.study.sweep.points import HOW, Points, Vary, grid_of, sample_of
+from sphshell_pin.study.sweep.points import HOW, Dist, Points, Vary, grid_of, sample_of
 
 _MORE_OF_PAIR = ("impulse", "peak_force_time")
 Changes = Mapping[str, str]

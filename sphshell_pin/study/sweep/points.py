@@ -6,20 +6,25 @@ import math
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from sphshell_pin.base.checks import stated_pairs
-from sphshell_pin.errors import InvalidParameter, import_extra
-from sphshell_pin.study.sweep.distributions import Dist, Frozen, distributions_of
+from sphshell_pin.errors import InvalidParameter
 
 Value = bool | int | float | str
 """A value of a varied key, as a table holds it; a list of the scenario file is its text."""
 Vary = Mapping[str, str | Sequence[object]]
+Frozen: TypeAlias = Any
+"""A distribution of scipy.stats with its parameters, which has no types."""
+Dist = Mapping[str, "str | Frozen"]
 
 MOST_RUNS = 1_000_000
 HOW = "key=lo:hi:n, key=lo:hi:log:n or key=a,b,c"
+FORMS = "normal(mean,deviation), uniform(low,high), lognormal(median,factor)"
+_CALL = re.compile(r"\s*(\w+)\s*\(([^(),]*),([^(),]*)\)\s*")
 # Steps between the ends are rounded: 0.3 rather than 0.30000000000000004, on every machine.
 _DIGITS = 12
 _PLAIN = r"\s*[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\s*"
@@ -40,7 +45,6 @@ class Points:
     values: Mapping[str, Sequence[Value]]
     parts: tuple[str, ...] = ()
     """What each run of a sample is for: "sample"; "A", "B", "AB KEY"."""
-    dists: Mapping[str, Frozen] = field(default_factory=dict)
 
     @property
     def changes(self) -> list[dict[str, str]]:
@@ -67,7 +71,7 @@ def grid_of(vary: Vary | Iterable[str]) -> Points:
         A text that says no values, a key or a value given twice, nothing to vary, too many runs.
     """
     axes: dict[str, tuple[Value, ...]] = {}
-    for key, given in stated_pairs("--vary", vary, f"must be {HOW}"):
+    for key, given in _stated("vary", vary, f"must be {HOW}", f"what varies: {HOW}").items():
         if not isinstance(given, Iterable):
             raise InvalidParameter(f"vary {key}", given, "must be a list of values, or a text")
         values = _parse(key, given) if isinstance(given, str) else tuple(map(_plain, given))
@@ -80,11 +84,7 @@ def grid_of(vary: Vary | Iterable[str]) -> Points:
         for value, text in zip(values, texts, strict=True):
             if texts.count(text) > 1:
                 raise InvalidParameter(f"vary {key}", text_of(value), "is given twice")
-        if key in axes:
-            raise InvalidParameter("vary", key, "is given twice: put all its values together")
         axes[key] = values
-    if not axes:
-        raise InvalidParameter("vary", {}, f"must say what varies: {HOW}")
     if (runs := math.prod(map(len, axes.values()))) > MOST_RUNS:
         raise InvalidParameter("vary", runs, f"runs are too many: {MOST_RUNS} at most")
     columns = zip(*itertools.product(*axes.values()), strict=True)
@@ -105,10 +105,12 @@ def sample_of(
     ------
     InvalidParameter
         A distribution, `n` or another argument is wrong.
-    MissingExtra
-        scipy is not installed.
     """
-    dists = distributions_of(dist)
+    if not isinstance(dist, Iterable):
+        raise InvalidParameter("dist", dist, "must map keys to distributions")
+    what = f"what is uncertain: a key with one of {FORMS}"
+    stated = _stated("dist", dist, f"must be KEY=DISTRIBUTION, one of {FORMS}", what)
+    dists = {key: one if hasattr(one, "ppf") else _frozen(key, one) for key, one in stated.items()}
     for name, value, least in (("n", n, 2), ("seed", seed, 0)):
         if isinstance(value, bool) or not isinstance(value, int) or value < least:
             raise InvalidParameter(name, value, f"must be a whole number, {least} or more")
@@ -120,7 +122,8 @@ def sample_of(
         raise InvalidParameter("n", n, must)
     if (runs := n * (d + 2 if indices else 1)) > MOST_RUNS:
         raise InvalidParameter("n", n, f"makes {runs} runs, too many: {MOST_RUNS} at most")
-    qmc = import_extra("scipy.stats", "sweep", "a sweep").qmc
+    from scipy.stats import qmc
+
     shares = np.asarray(qmc.Sobol(2 * d if indices else d, rng=seed).random(n)) + _HALF_STEP
     parts = [SAMPLE] * n
     if indices:
@@ -134,7 +137,7 @@ def sample_of(
             values[key] = np.asarray(one.ppf(share), dtype=float).tolist()
         if not np.all(np.isfinite(values[key])):
             raise InvalidParameter("dist", key, "has values that are not finite")
-    return Points(values, tuple(parts), dists)
+    return Points(values, tuple(parts))
 
 
 def text_of(value: Value) -> str:
@@ -142,6 +145,44 @@ def text_of(value: Value) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return value if isinstance(value, str) else repr(value)
+
+
+def _stated(
+    name: str, given: Mapping[str, object] | Iterable[str], must: str, what: str
+) -> dict[str, object]:
+    """Return what is stated by key; InvalidParameter for a key given twice, and for none."""
+    found: dict[str, object] = {}
+    for key, one in stated_pairs(name, given, must):
+        if key in found:
+            raise InvalidParameter(name, key, "is given twice: put all that it may be together")
+        found[key] = one
+    if not found:
+        raise InvalidParameter(name, {}, what, "must say")
+    return found
+
+
+def _frozen(key: str, text: object) -> Frozen:
+    """Return the distribution that a text states."""
+    from scipy import stats
+
+    call = _CALL.fullmatch(text) if isinstance(text, str) else None
+    try:
+        kind, a, b = (call[1].lower(), float(call[2]), float(call[3])) if call else ("", 0.0, 0.0)
+    except ValueError:
+        kind = ""
+    if kind == "normal":
+        must, valid = "deviation > 0", b > 0
+    elif kind == "uniform":
+        must, valid = "low < high", a < b
+    elif kind == "lognormal":
+        must, valid = "median > 0, factor > 1", a > 0 and b > 1
+    else:
+        raise InvalidParameter(f"dist {key}", text, f"must be one of {FORMS}")
+    if not valid:
+        raise InvalidParameter(f"dist {key}", text, f"must have {must}")
+    if kind == "lognormal":
+        return stats.lognorm(math.log(b), scale=a)
+    return stats.norm(a, b) if kind == "normal" else stats.uniform(a, b - a)
 
 
 def _parse(key: str, text: str) -> tuple[Value, ...]:
