@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -64,65 +63,53 @@ def new_scenario(
         What cannot be found out and is not given, a file that cannot be read or written, or that no
         draft works: the text says what fails in it and what to change.
     """
-    asked = Asked(robot, surface, **options)
-
-    def instead(note: str, **changes: Any) -> NewScenario:
-        made = _written(replace(asked, **changes))
-        return replace(made, why=(note, *made.why))
-
-    try:
-        return _written(asked)
-    except CannotReach as error:
-        said, stated = str(error).partition(";")[0], asked.frame and asked.radius
-        farther = [error.out]
-        for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
-            try:
-                return instead(f"frame '{other}', as with '{error.frame}' {said}", frame=other)
-            except CannotReach as another:
-                farther.append(another.out)
-            except SphshellError:
-                pass
-        # A sphere of which the place is asked for stays there.
-        for tip in farther if asked.offset is None and not stated else ():
-            with suppress(SphshellError):
-                if tip is not None:
-                    return _written(asked, tip)
-        raise
-    except TooHeavy as error:
-        if asked.against is not None:
-            raise
-        said = str(error).partition(";")[0]
-        return instead(f"the part is of plastic, as with steel {said}", against="plastic")
-    except RobotError as error:
-        if not asked.mimic:
-            raise
-        said = str(error).partition(";")[0]
+    first = Asked(robot, surface, **options)
+    attempts: list[tuple[tuple[str, ...], Asked]] = [((), first)]
+    for notes, asked in attempts:
         try:
-            return instead(
-                f"joints that are coupled move freely (--no-mimic), as else: {said}", mimic=False
-            )
-        except RobotError:
-            raise error from None
-    except CannotStand as error:
-        if asked.base is not None:
-            raise
+            made = _written(asked)
+        except SphshellError as error:
+            if (asked.frame, asked.tip) == (first.frame, first.tip):
+                refused = error
+            attempts += [
+                ((*notes, note), replace(asked, **changes))
+                for note, changes in _instead(error, asked)
+            ]
+        else:
+            return replace(made, why=tuple(one for one in (*notes, *made.why) if one))
+    raise refused
+
+
+def _instead(error: SphshellError, asked: Asked) -> list[tuple[str, dict[str, Any]]]:
+    """Return what to try where that fails which is asked for: why, and what is asked instead."""
+    said = str(error).partition(";")[0]
+    if isinstance(error, CannotReach) and asked.tip is None:
+        others = error.others[:_MOST_ENDS] if asked.frame is None else ()
+        limbs = [(f"frame '{one}', as with '{error.frame}' {said}", one) for one in others]
+        # A sphere of which the place is asked for stays there.
+        stays = asked.offset is not None or (asked.frame and asked.radius) or error.out is None
+        farther = [] if stays else [("", {"tip": error.out})]
+        return [*((note, {"frame": frame}) for note, frame in limbs), *farther]
+    if isinstance(error, TooHeavy) and asked.against is None:
+        return [(f"the part is of plastic, as with steel {said}", {"against": "plastic"})]
+    if isinstance(error, RobotError) and asked.mimic:
+        note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
+        return [(note, {"mimic": False})]
+    if isinstance(error, CannotStand) and asked.base is None:
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-    made = new_scenario(robot, surface, **{**options, "base": "fixed"})
-    return replace(made, why=(note, *made.why))
+        return [(note, {"base": "fixed"})]
+    return []
 
 
-def _written(asked: Asked, tip: Tip | None = None) -> NewScenario:
-    """Write the scenario that is asked for, with this `tip` if it is given.
-
-    CannotStand as DropSearch raises it.
-    """
+def _written(asked: Asked) -> NewScenario:
+    """Write the scenario that is asked for; errors as of `new_scenario`."""
     file = _free_path(asked)
     section, bare, shaped = _bare(asked, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
-    if tip is not None:
-        tips = [tip]
+    if asked.tip is not None:
+        tips = [asked.tip]
     elif in_hand:
         tips = every_tip(loaded, asked)
     else:
@@ -130,33 +117,29 @@ def _written(asked: Asked, tip: Tip | None = None) -> NewScenario:
             loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
     check_masses(bare.assembly, joints_aside(bare.assembly.model, tips))
-    shell = _shell_section(asked, file, bare, tips)
-    built = _build_bare(section, file, shell, reuse=bare)
-    tips = tips if tip else _sized_to(built, tips, asked)
+    built = _build_bare(section, file, _shell_section(asked, file, bare, tips), reuse=bare)
+    tips = _sized_to(built, tips, asked)
     built = _sided(built, tips, inside=asked.inside)
     # What is written is what was built, and tried.
     search: type[Search] = DropSearch if floats(built.assembly.model) else PressSearch
     try:
         made = (HoldSearch if in_hand else search)(asked, built, tips, file).find()
-    except CannotStand:
-        raise
     except SphshellError as error:
-        if shaped != "fixed" or in_hand:
-            raise
-        raise SphshellError(f"{error}; or let it float, --base floating") from None
+        if shaped == "fixed" and not in_hand:
+            error.args = (f"{error}; or let it float, --base floating",)
+        raise
     if made.part:
         part = file.with_name(part_file(file.stem))
         _check_free(part, force=asked.force)
         write_whole(part, made.part.encode())
     write_whole(file, made.text.encode())
-    shape = shaped and not in_hand and f"the base is {shaped}, by the robot's shape: or --base"
+    shape = f"the base is {shaped}, by the robot's shape: or --base" if shaped else ""
     masses = loaded.assumed
     if masses and asked.density is None:
         masses += ": another with --density"
     idle = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
     idle = idle and f"held, as nothing that they move has a mass: joints {idle}"
-    why = tuple(one for one in (shape, *made.why, masses, idle) if one)
-    return replace(made, why=why)
+    return replace(made, why=("" if in_hand else shape, *made.why, masses, idle))
 
 
 def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
@@ -166,19 +149,15 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     """
     section = _robot_section(asked, file)
     bare = _build_bare(section, file)
-    loaded, changed = bare.assembly.loaded[0], dict[str, object]()
+    loaded, density = bare.assembly.loaded[0], asked.density
     shaped = None if asked.base is not None else _base(bare.assembly.model)
-    if (base := shaped or asked.base) != section.base:
-        changed["base"] = base
-    states = section.name is not None or asked.density is not None
-    floating = base == "floating"
-    lacks = lacks_moments(loaded.description) or lacks_masses(
-        loaded.model, loaded.description, floating=floating
-    )
-    if not states and lacks:
-        changed["density"] = _DENSITY
-    if changed:
-        section = section.model_copy(update=changed)
+    base = shaped or asked.base
+    if section.name is None and density is None:
+        masses = loaded.model, loaded.description
+        if lacks_moments(masses[1]) or lacks_masses(*masses, floating=base == "floating"):
+            density = _DENSITY
+    if (base, density) != (section.base, section.density):
+        section = section.model_copy(update={"base": base, "density": density})
         bare = _build_bare(section, file)
     return section, bare, shaped
 
@@ -188,7 +167,8 @@ def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
 
     A round end that is larger than the surface gets a smaller ball on it.
     """
-    if asked.word is not None or asked.tips == "all" or asked.radius is not None:
+    stated = asked.radius is not None or asked.tip is not None
+    if asked.word is not None or asked.tips == "all" or stated:
         return list(tips)
     (made,) = built.shells.values()
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
