@@ -7,7 +7,13 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
-from sphshell_pin.scenario.drafting.touch_points import TouchPoint, come_down, facet_areas
+from sphshell_pin.scenario.drafting.touch_points import (
+    TouchPoint,
+    come_down,
+    facet_areas,
+    roomy_places,
+    side_of_sheet,
+)
 from sphshell_pin.scenario.drafting.wording import listed
 from sphshell_pin.shell.faces import Face, described
 from sphshell_pin.shell.raw import KINDS
@@ -16,8 +22,8 @@ from sphshell_pin.shell.shell import Shell
 # How far the sphere may touch beside the place asked for, in radii, and a point be from the
 # surface, as a part of its size; radii of faces that are alike, as a part of them.
 _BESIDE, _OFF, _ALIKE = 0.25, 0.02, 0.01
-# Places on a face that are tried, and faces.
-_MOST_PLACES, _MOST_FACES = 12, 20
+# Faces that are tried.
+_MOST_FACES = 20
 
 
 def asked_touches(asked: Asked, shell: Shell, radius: float, gap: float) -> list[TouchPoint]:
@@ -52,36 +58,25 @@ def touch_from_outside(shell: Shell, point: Array, radius: float, gap: float) ->
         outward = float(shell.closest_points(aside[None], method="facets").distances[0])
         outward = -outward if shell.side == "inside" else outward
     else:
-        # An open part is around its middle; a flat one is touched from above.
-        outward = float((on - shell.box.mean(axis=0)) @ normal)
-        if abs(outward) < 1e-6 * shell.size:
-            outward = float(normal @ np.array([1e-6, 1e-3, 1.0]))
+        # An open part is around its middle.
+        outward = side_of_sheet(shell, normal, (on - shell.box.mean(axis=0)) @ normal)
     normal = normal if outward >= 0 else -normal
     return come_down(shell, on + (1.5 * radius + gap) * normal, -normal, radius, gap)
 
 
 def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPoint]:
     """Return touch points on the faces that `text` describes, the largest face first."""
-    faces = _described_faces(shell, text)
-    areas, middles = facet_areas(shell), shell.vertices[shell.triangles].mean(axis=1)
-    carriers = np.asarray(shell.triangle_element)
-    masks = [np.isin(carriers, face.elements) for face in faces]
+    faces, areas = _described_faces(shell, text), facet_areas(shell)
+    masks = [np.isin(shell.triangle_element, face.elements) for face in faces]
+    heights = shell.vertices[shell.triangles, 2].max(axis=1)
     # The upper one of faces alike.
-    ranks = [(float(f"{-areas[on].sum():.3g}"), -float(middles[on, 2].max())) for on in masks]
-    for k in sorted(range(len(faces)), key=ranks.__getitem__)[:_MOST_FACES]:
-        on = masks[k]
-        center = np.average(middles[on], axis=0, weights=areas[on])
-        some = middles[on][np.argsort(np.linalg.norm(middles[on] - center, axis=1))]
-        some = some[:: max(1, len(some) // _MOST_PLACES)][:_MOST_PLACES]
-        places = shell.closest_points([center, *some] if faces[k].kind == "plane" else some).points
+    masks.sort(key=lambda on: (float(f"{-areas[on].sum():.3g}"), -float(heights[on].max())))
+    for on in masks[:_MOST_FACES]:
+        places = shell.closest_points(np.array(roomy_places(shell, on)[0])).points
         spots = [touch_from_outside(shell, place, radius, gap) for place in places]
-        found = [
-            spot
-            for spot, place in zip(spots, places, strict=True)
-            if np.linalg.norm(spot.point - place) <= _BESIDE * radius
-        ]
-        if found:
-            return found
+        away = np.linalg.norm([spot.point for spot in spots] - places, axis=1)
+        if (away <= _BESIDE * radius).any():
+            return [spots[k] for k in np.flatnonzero(away <= _BESIDE * radius)]
     raise SphshellError(
         f"a sphere of radius {1e3 * radius:.3g} mm touches none of the {len(faces)} faces "
         f"'{text}': it does not fit, or touches others first; take a smaller --radius or another "
@@ -91,27 +86,22 @@ def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPo
 
 def _described_faces(shell: Shell, text: str) -> list[Face]:
     """Return the faces that `text` describes as `check` lists them: a kind, and its radius."""
-    words = re.fullmatch(
-        r"\s*(\w+?)s?(?:\s+(?:of\s+)?(?:radius\s+)?([\d.eE+-]+)(?:\s+and\s+([\d.eE+-]+))?\s*mm)?\s*",
-        text.replace("tori", "torus"),
-    )
-    kind = words[1] if words else ""
-    kind = "torus" if kind == "toru" else kind
+    words = re.fullmatch(r"([a-z]+)((?:of|radius|and|mm|[\s\d.eE+-])*)", text.strip())
+    name = words[1].replace("tori", "torus") if words else ""
+    kind = next((one for one in KINDS if name in (one, f"{one}s")), "")
     lengths = f"the faces of this part: {described(shell.faces, shell.num_elements)}"
-    if words is None or kind not in KINDS:
+    if words is None or not kind:
         raise SphshellError(
             f"no face '{text}': give x,y,z [m], or one of {', '.join(KINDS)} with its radius, as "
             f"'cylinder 5.5 mm'; {lengths}"
         )
-    asked = [float(one) for one in words.groups()[1:] if one is not None]
-
-    def fits(face: Face) -> bool:
+    asked = [float(one) for one in re.findall(r"[\d.]+(?:[eE][+-]?\d+)?", words[2])]
+    found = list[Face]()
+    for face in shell.faces:
         radii = [1e3 * r for r in (face.radius, face.minor_radius) if r is not None]
-        return face.kind == kind and all(
-            abs(one / stated - 1) < _ALIKE for one, stated in zip(radii, asked, strict=False)
-        )
-
-    found = [face for face in shell.faces if fits(face)]
+        alike = [abs(r / one - 1) < _ALIKE for r, one in zip(radii, asked, strict=False)]
+        if face.kind == kind and all(alike):
+            found.append(face)
     if not found:
         raise SphshellError(f"the part has no face '{text}'; {lengths}")
     return found

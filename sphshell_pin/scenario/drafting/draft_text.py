@@ -44,16 +44,14 @@ def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, 
     )
     if not robot.mimic:
         text += "mimic = false # joints that mimic others move freely\n"
-    root = None if plan.root is None else _rounded(plan.root, 9 if part else digits)
     if robot.start:
         text += _fill("posture") + _table(robot.start)
     if part:
+        root = _rounded(pin.SE3ToXYZQUAT(plan.placement), 9)
         text += _fill("part", body=part, material=contact.against, urdf=part_file(name), root=root)
-    elif root:
-        text += _fill("root", root=root)
     sides = {"side": _SIDES[shell.side], "frame": "part/part" if part else shell.frame}
     text += _fill("shell", shell=shell, primitive=shell.model_dump()["primitive"], **sides)
-    if plan.root is None:
+    if plan.placement is not None and part is None:
         angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
         angles[np.abs(angles) < 1e-6] = 0.0
         xyz, rpy = _rounded(plan.placement.translation, digits), _rounded(angles, digits)

@@ -1,7 +1,7 @@
 """A new scenario in which a hand holds a free part between all its fingertips."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.plan import Hold, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
-from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
+from sphshell_pin.scenario.drafting.searching import Search, coordinates
 from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Materials
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
@@ -34,11 +34,7 @@ _SAFETY, _MOST_RUNS = 3.0, 6
 _DRAWN = 0.1
 
 
-class CannotHold(SphshellError):
-    """No grasp of all fingertips that were asked for holds the part."""
-
-
-class TooHeavy(CannotHold):
+class TooHeavy(SphshellError):
     """There are grasps, and none of them bears the part's weight."""
 
 
@@ -65,33 +61,34 @@ class HoldSearch(Search):
     Where all tips cannot, those do without the fingers of the fewest joints, three at least.
     """
 
-    def find(self) -> NewScenario:
-        """Return the first draft that holds the part; SphshellError if none does."""
+    refused: list[SphshellError]
+    """Why none of so many tips, or fewer, can hold it."""
+
+    def drafts(self) -> Iterator[Plan]:
+        """Yield grasps of all tips, then of fewer."""
         if floats(self.model):
             raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
-        tips, refused, last = self.tips, "", CannotHold()
+        tips, self.refused = self.tips, []
         ranks = Hand(self.model, tips).ranks
         order = sorted(range(len(tips)), key=lambda k: -len(ranks[k]))
         for count in range(len(tips), min(len(tips), 3) - 1, -1):
-            try:
-                found = self._held([tips[k] for k in sorted(order[:count])])
-            except CannotHold as error:
-                refused, last = refused or str(error), error
-                continue
-            if refused:
-                note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
-                found = replace(found, why=(note, *found.why))
-            return found
-        raise last
+            for plan in self._grasps([tips[k] for k in sorted(order[:count])]):
+                said = [str(error).partition(";")[0] for error in self.refused[:1]]
+                notes = [f"{count} of {len(tips)} fingertips hold it: {one}" for one in said]
+                yield replace(plan, why=(*notes, *plan.why))
 
-    def _held(self, tips: Sequence[Tip]) -> NewScenario:
-        """Return a scenario in which all of the `tips` hold the part; CannotHold if none works."""
+    def refusal(self) -> SphshellError:
+        """Return why the fewest tips do not hold it."""
+        return self.refused[-1]
+
+    def _grasps(self, tips: Sequence[Tip]) -> Iterator[Plan]:
+        """Yield drafts in which all of the `tips` hold the part; say at the end why none works."""
         press, shell = self.asked.press, self.shell
         sphere = find_material(self.asked.material or "rubber")
         materials = Materials(sphere, find_material(self.asked.against or "steel"))
         part, hand = Part.of(shell, materials.surface), Hand(self.model, tips)
         total = _SAFETY * part.mass * GRAVITY / materials.friction if press is None else 2.0 * press
-        links, blocked = self.links(tips, hand.lock, self.q0), list[str]()
+        links, blocked, said = self.hold_links(tips, hand.lock, self.q0), list[str](), ""
 
         def free(q: Array, placement: pin.SE3 | None = None) -> bool:
             if placement is None:
@@ -101,24 +98,20 @@ class HoldSearch(Search):
             return found is None
 
         found = grasps(hand, self.q0, shell, part.weight, total, materials.friction, GAP, free)
-        if not found:
-            raise _no_grasp(shell, len(tips), blocked)
-        said = ""
         for one in found[:_MOST_RUNS]:
-            grasp = _pressed(one, part, press, materials.friction)
-            plan = _planned(hand, grasp, shell, part, materials)
+            plan = _planned(
+                hand, _pressed(one, part, press, materials.friction), shell, part, materials
+            )
             if isinstance(plan, str):
                 said = plan
                 continue
-            section = self.locked(hand.lock, label="hand", start=_angles(hand, grasp.q))
-            works = self.run(section, plan, links)
-            if works is not None:
-                return works
+            yield plan
             said = self.faults[-1].text
-        raise TooHeavy(
+        heavy = (
             f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
             "--against, another --press, or a smaller part"
         )
+        self.refused.append(TooHeavy(heavy) if found else _no_grasp(shell, len(tips), blocked))
 
 
 def _planned(
@@ -142,7 +135,8 @@ def _planned(
     depths = (forces / [materials.stiffness(float(one)) for one in hand.radii]) ** (2 / 3)
     pressed = hand.close_on(grasp.q, shell, grasp.placement, -depths)
     deep = grasp.q if pressed is None else pressed[0]
-    drawn = _angles(hand, pin.integrate(model, deep, torques / kp), "hand/")
+    angles = coordinates(model, pin.integrate(model, deep, torques / kp))
+    drawn = {f"hand/{name}": angles[name] for name in (model.names[j] for j in hand.joints)}
     used = grasp.friction / materials.friction
     frames = ", ".join(f"'{tip.frame}'" for tip in hand.tips)
     why = (
@@ -157,29 +151,24 @@ def _planned(
         Hold(kp, kd, _DRAWN, drawn, press),
         DURATION,
         GAP,
+        grasp.q,
+        hand.lock,
         grasp.placement,
-        pin.SE3ToXYZQUAT(grasp.placement),
         why,
         part,
-        int(np.argmax(forces)),
+        strongest=int(np.argmax(forces)),
     )
 
 
-def _angles(hand: Hand, q: Array, prefix: str = "") -> dict[str, object]:
-    """Return the coordinates of the joints that move the tips."""
-    found, names = coordinates(hand.model, q), [hand.model.names[j] for j in hand.joints]
-    return {prefix + name: found[name] for name in names}
-
-
-def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:
+def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> SphshellError:
     sizes = " x ".join(f"{1e3 * one:.3g}" for one in shell.box[1] - shell.box[0])
     if blocked:
         link = max(set(blocked), key=blocked.count)
-        return CannotHold(
+        return SphshellError(
             f"link '{link}' would be in the part, or another one, wherever all {count} fingertips "
             f"touch it and could hold it: take a part of another size than {sizes} mm"
         )
-    return CannotHold(
+    return SphshellError(
         f"the {count} fingertips cannot hold a part of {sizes} mm: nowhere that was tried do all "
         "touch it with forces inside their friction cones; take a part of another size, or its "
         "--unit"

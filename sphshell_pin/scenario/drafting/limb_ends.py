@@ -1,7 +1,7 @@
 """Where a limb ends, by the geometry of its last link: the sphere to put there."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -59,6 +59,13 @@ class Tip:
 def joint_of(model: pin.Model, frame: str) -> int:
     """Return the joint that carries a frame; FrameNotFound lists the names."""
     return int(model.frames[find_frame(model, frame)].parentJoint)
+
+
+def sphere_centers(model: pin.Model, q: Array, tips: Sequence[Tip]) -> Array:
+    """Return the spheres' centers (k, 3) [m] in the world at q (nq,)."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return np.array([data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in tips])
 
 
 def gripper_joints(model: pin.Model) -> set[int]:

@@ -19,10 +19,10 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
 from sphshell_pin.robots.inertia import few, lacks_masses, lacks_moments
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
-from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
+from sphshell_pin.scenario.drafting.dropping import DropSearch
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import HoldSearch, TooHeavy, every_tip
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, sphere_centers
 from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
@@ -308,7 +308,8 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
     largest = max(tip.radius for tip in tips)
     half, length = _IN_HAND * largest, 4 * _IN_HAND * largest
     if asked.tips == "one":
-        spread = float(np.linalg.norm(np.ptp(sphere_centers(built, tips), axis=0)))
+        centers = sphere_centers(built.assembly.model, built.assembly.q0, tips)
+        spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
         half = _round_up(max(_SIZE * largest, spread))
         length = (0.4 if word == "box" else 2.0) * half
     primitives: dict[str, Primitive] = {

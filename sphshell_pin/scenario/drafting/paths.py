@@ -11,11 +11,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.placing import Place, nearer
-from sphshell_pin.scenario.drafting.touch_points import (
-    TouchPoint,
-    paths_on_surface,
-    touches_once,
-)
+from sphshell_pin.scenario.drafting.touch_points import TouchPoint, paths_on_surface, touches_once
 from sphshell_pin.scenario.drafting.vectors import moved, tangents
 from sphshell_pin.scenario.drafting.wording import mm
 from sphshell_pin.shell.shell import Shell

@@ -142,7 +142,8 @@ class Press:
         moving = way.length / self.speed + 2 * RAMP * corners
         duration = math.ceil(10 * (self.lead_in + (moving or 0.5) + 0.5)) / 10
         said = tuple(one for one in why if one)
-        return Plan((tip,), self.contact, self, duration, self.gap, place.placement, None, said)
+        control = self.contact, self, duration, self.gap
+        return Plan((tip,), *control, stance.q, lock, place.placement, said, weak=self.weak)
 
 
 @dataclass(frozen=True)
@@ -164,9 +165,10 @@ class Hold:
 class Plan:
     """A scenario before it is text.
 
-    `placement` is that of the shell in the world. A free root starts at `root` (7,): x y z and
-    quaternion x y z w; a free `part` there carries the shell. `why` has one sentence for each
-    choice that was made for the user. The tip number `strongest` presses most, and is checked.
+    The robot starts at q (nq,), without the joints to `lock`; the effort limits of motors that are
+    too `weak` are not modeled. `placement` is that of the shell in the world, or of a free `part`
+    that carries it; None: it stands as in its file. `why` has one sentence for each choice that was
+    made for the user. The tip number `strongest` presses most, and is checked.
     """
 
     tips: tuple[Tip, ...]
@@ -174,10 +176,12 @@ class Plan:
     control: Press | Hold | None
     duration: float
     gap: float
-    placement: pin.SE3
-    root: Array | None
+    q: Array
+    lock: tuple[str, ...]
+    placement: pin.SE3 | None = None
     why: tuple[str, ...] = ()
     part: Part | None = None
+    weak: bool = False
     strongest: int = 0
 
 

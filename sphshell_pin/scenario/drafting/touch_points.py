@@ -1,19 +1,14 @@
 """A place to touch on any surface: its broad side, away from holes, and a path on it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, tangents, unit
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.shell import Shell
-
+from sphshell_pin.shell.shell import Shell
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
 _SHARP_ANGLE = np.deg2rad(35.0)
@@ -49,18 +44,23 @@ def find_touch_point(
     radius: float,
     gap: float,
     *,
-    toward: Array | None = None,
+    toward: Array,
     inside: bool = False,
-    beside: Array | None = None,
+    beside: Array | float = 0.0,
 ) -> TouchPoint:
     """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
-    `toward` (3,) is the side to touch from, by default the first one of `sides`. With `inside` the
-    surface is touched from its middle. `beside` (3,) [m] moves the place away from the middle.
+    It is touched from the side `toward` (3,), with `inside` from its middle. `beside` (3,) [m]
+    moves the place away from the middle.
     """
-    middle = shell.box.mean(axis=0) + (0.0 if beside is None else beside)
-    axis = sides(shell)[0] if toward is None else np.asarray(toward, dtype=float)
-    return come_down(shell, middle if inside else _above(shell, axis, middle), -axis, radius, gap)
+    start = shell.box.mean(axis=0) + beside
+    if not inside:
+        # Far out above the middle or, over a hole, beside it.
+        start = start + 2 * shell.size * toward
+        if not _advance(shell, start, -toward, 0.0, 1e-6 * shell.size)[2]:
+            near = shell.closest_points(start[None]).points[0]
+            start = near + toward * (toward @ (start - near))
+    return come_down(shell, start, -toward, radius, gap)
 
 
 def sides(shell: Shell) -> list[Array]:
@@ -87,25 +87,29 @@ def touch_points(
     shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
 ) -> Iterator[TouchPoint]:
     """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
-    middle = shell.box.mean(axis=0)
-    for point in (middle, *_roomy_places(shell, -toward if inside else toward)[0]):
+    middle, facing = shell.box.mean(axis=0), _facing(shell, -toward if inside else toward)
+    for point in (middle, *roomy_places(shell, facing)[0]):
         beside = point - middle - toward * (toward @ (point - middle))
         yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
 
 
 def widest_room(shell: Shell) -> float:
     """Return the largest distance [m] of a place from where the surface ends, or turns sharply."""
-    return max(_roomy_places(shell, side)[1] for side in sides(shell))
+    return max(roomy_places(shell, _facing(shell, side))[1] for side in sides(shell))
 
 
-def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
-    """Return points (3,) apart from each other on what faces `toward`, the best one first.
+def _facing(shell: Shell, toward: Array) -> NDArray[np.bool_]:
+    """Return which facets (n,) face `toward` (3,)."""
+    return np.asarray(shell.triangle_normals @ toward > _FACING)
+
+
+def roomy_places(shell: Shell, facets: NDArray[np.bool_]) -> tuple[list[Array], float]:
+    """Return points (3,) apart from each other on some `facets` (n,), the best one first.
 
     The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
     corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
-    normals, areas = shell.triangle_normals, facet_areas(shell)
-    facing = np.flatnonzero(normals @ toward > _FACING)
+    normals, areas, facing = shell.triangle_normals, facet_areas(shell), np.flatnonzero(facets)
     if not len(facing):
         return [], 0.0
     ends = np.sort(shell.triangles[facing][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -210,19 +214,14 @@ def _bulge(shell: Shell) -> Array | None:
     heights = shell.vertices @ normal
     middle = shell.closest_points(shell.box.mean(axis=0)[None]).points[0] @ normal
     # The box of a dome is around its hollow.
-    bulge = float(middle - 0.5 * (heights.max() + heights.min()))
-    if abs(bulge) < 1e-6 * shell.size:
-        bulge = float(normal @ np.array([1e-6, 1e-3, 1.0]))
+    bulge = side_of_sheet(shell, normal, middle - 0.5 * (heights.max() + heights.min()))
     return normal if bulge >= 0 else -normal
 
 
-def _above(shell: Shell, axis: Array, middle: Array) -> Array:
-    """Return a place far out along `axis`, above the middle or, over a hole, beside it."""
-    far = middle + 2 * shell.size * axis
-    if not _advance(shell, far, -axis, 0.0, 1e-6 * shell.size)[2]:
-        beside = shell.closest_points(far[None]).points[0]
-        far = beside + axis * (axis @ (far - beside))
-    return far
+def side_of_sheet(shell: Shell, normal: Array, height: float) -> float:
+    """Return the `height` [m] that says whether `normal` (3,) points out; up of what is flat."""
+    flat = abs(height) < 1e-6 * shell.size
+    return float(normal @ np.array([1e-6, 1e-3, 1.0]) if flat else height)
 
 
 def come_down(
