@@ -8,8 +8,8 @@ import sphshell_pin as sp
 from sphshell_pin.scenario.drafting.dropping import way_down
 from sphshell_pin.scenario.drafting.touch_points import (
     find_touch_point,
-    sides,
     paths_on_surface,
+    sides,
     touch_points,
     touches_once,
 )
