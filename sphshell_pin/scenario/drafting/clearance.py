@@ -93,51 +93,46 @@ class Links:
 
         With `whole` a link that is inside as a whole, and touches nothing, counts too.
         """
-        model, geometry = self.model, self._geometry
         self._place(q)
-        pin.updateFramePlacements(model, self._data)
-        centers = [
-            self._data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in self._tips
-        ]
-        part = coal.Transform3s(placement.rotation, placement.translation)
+        pin.updateFramePlacements(self.model, self._data)
+        frames = [self._data.oMf[find_frame(self.model, tip.frame)] for tip in self._tips]
+        centers = [frame.act(tip.offset) for frame, tip in zip(frames, self._tips, strict=True)]
         for k, (i, at) in enumerate(self._objects):
-            one, pose = geometry.geometryObjects[i], self._geometry_data.oMg[i]
-            spheres = [(centers[k], self._tips[k].radius) for k in at]
-            if self._touches(one, pose, part, spheres) or (
-                whole and self._inside(one, pose, placement)
+            one, pose = self._geometry.geometryObjects[i], self._geometry_data.oMg[i]
+            spheres = [(centers[k], AT_TIP * self._tips[k].radius) for k in at]
+            if self._touches(one, pose, placement, spheres) or (
+                whole and self._inside(one, placement.actInv(pose))
             ):
                 # What is in the way here will be so in the next place, too.
                 self._objects.insert(0, self._objects.pop(k))
-                return _link_of(model, one)
+                name = str(self.model.frames[one.parentFrame].name)
+                return name if name != "universe" else str(one.name)
         return None
 
     def _touches(
         self,
         one: pin.GeometryObject,
         pose: pin.SE3,
-        part: coal.Transform3s,
+        placement: pin.SE3,
         spheres: Sequence[tuple[Array, float]],
     ) -> bool:
-        """Whether a geometry touches the surface beside the spheres."""
-        place = coal.Transform3s(pose.rotation, pose.translation)
-        most = _MOST_CONTACTS if spheres else 1
-        request, result = (
-            coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, most),
-            coal.CollisionResult(),
-        )
-        coal.collide(one.geometry, place, self._surface, part, request, result)
+        """Whether a geometry touches the surface beside balls of these centers and radii."""
+        result = coal.CollisionResult()
+        flag, most = coal.CollisionRequestFlag.CONTACT, _MOST_CONTACTS if spheres else 1
+        link, part = (coal.Transform3s(at.rotation, at.translation) for at in (pose, placement))
+        request = coal.CollisionRequest(flag, most)
+        coal.collide(one.geometry, link, self._surface, part, request, result)
         return any(
-            all(np.linalg.norm(contact.pos - c) > AT_TIP * radius for c, radius in spheres)
+            all(np.linalg.norm(contact.pos - center) > radius for center, radius in spheres)
             for contact in result.getContacts()
         )
 
-    def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
+    def _inside(self, one: pin.GeometryObject, pose: pin.SE3) -> bool:
         """Whether a point of a geometry is behind the surface, where that is closed."""
         if not self.shell.is_closed or self.shell.side == "inside":
             return False
         mesh = isinstance(one.geometry, coal.BVHModelBase)
-        point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
-        at = placement.actInv(pose.act(point))
+        at = pose.act(np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3))
         if (at < self.shell.box[0]).any() or (at > self.shell.box[1]).any():
             return False
         return bool(self.shell.closest_points(at[None], method="facets").distances[0] < 0)
@@ -169,8 +164,3 @@ def _is_sphere(one: pin.GeometryObject, model: pin.Model, frame: pin.Frame, tip:
         return False
     away = one.placement.translation - frame.placement.act(tip.offset)
     return bool(np.linalg.norm(away) < 1e-3 * tip.radius)
-
-
-def _link_of(model: pin.Model, one: pin.GeometryObject) -> str:
-    name = str(model.frames[one.parentFrame].name)
-    return name if name != "universe" else str(one.name)

@@ -87,7 +87,11 @@ class HoldSearch(Search):
         sphere = find_material(self.asked.material or "rubber")
         materials = Materials(sphere, find_material(self.asked.against or "steel"))
         part, hand = Part.of(shell, materials.surface), Hand(self.model, tips)
-        total = _SAFETY * part.mass * GRAVITY / materials.friction if press is None else 2.0 * press
+        total = (
+            _SAFETY * part.inertia.mass * GRAVITY / materials.friction
+            if press is None
+            else 2.0 * press
+        )
         links, blocked, said = self.hold_links(tips, hand.lock, self.q0), list[str](), ""
 
         def free(q: Array, placement: pin.SE3 | None = None) -> bool:
@@ -141,13 +145,13 @@ def _planned(
     frames = ", ".join(f"'{tip.frame}'" for tip in hand.tips)
     why = (
         f"{len(hand.tips)} fingertips, {hand.tips[0].source}: {frames}",
-        f"the part is {materials.surface.name} all through and weighs {part.mass:.3g} kg",
+        f"the part is {materials.surface.name} all through and weighs {part.inertia.mass:.3g} kg",
         f"the fingertips press with {press:.3g} N at most; its weight and their forces use "
         f"{100 * used:.0f} % of the friction",
     )
     return Plan(
         hand.tips,
-        materials.sticking(radius, 0.1, press, part.mass / len(hand.tips)),
+        materials.sticking(radius, 0.1, press, part.inertia.mass / len(hand.tips)),
         Hold(kp, kd, _DRAWN, drawn, press),
         DURATION,
         GAP,
