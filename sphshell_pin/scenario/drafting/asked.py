@@ -155,17 +155,7 @@ class Asked:
     @property
     def slides(self) -> bool:
         """Whether a path is asked for."""
-        return isinstance(self.path, str) or (self.path is not None and len(self.path) > 1)
-
-    @property
-    def whole(self) -> bool:
-        """Whether part of the path will not do."""
-        return isinstance(self.path, np.ndarray) or self.path in SHAPES[1:]
-
-    @property
-    def fixed(self) -> bool:
-        """Whether the place is asked for."""
-        return self.at is not None or isinstance(self.path, np.ndarray)
+        return self.path is not None and len(self.path) > 1
 
 
 def _numbers(text: str) -> Array | None:

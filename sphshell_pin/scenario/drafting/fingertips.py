@@ -107,15 +107,12 @@ def only_turns(model: pin.Model) -> bool:
     """
     first = 2 if floats(model) else 1
     low, high = model.lowerPositionLimit, model.upperPositionLimit
+    leaves = _leaves(model)
     # A range of 0 is that of a sensor, which a simulator keeps by a joint.
-    turns = {
-        j
-        for j in _leaves(model) - {first - 1}
-        if model.joints[j].nq != 1 or low[model.joints[j].idx_q] < high[model.joints[j].idx_q]
-    }
-    leaves = turns or _leaves(model)
-    depths = [len(model.supports[j]) - first for j in leaves]
-    endless = all(_is_endless(model, j) for j in leaves)
+    places = {j: model.joints[j] for j in leaves - {first - 1}}
+    turns = {j for j, one in places.items() if one.nq != 1 or low[one.idx_q] < high[one.idx_q]}
+    depths = [len(model.supports[j]) - first for j in turns or leaves]
+    endless = all(_is_endless(model, j) for j in turns or leaves)
     carried = sum(one.mass for one in list(model.inertias)[first:])
     heavy = model.inertias[first - 1].mass > carried * (1 if len(depths) > 1 else _MUCH)
     return endless and heavy and max(depths, default=3) <= 2
@@ -148,11 +145,7 @@ def _tips_of(robot: LoadedRobot, shipped: str | None) -> list[Tip]:
 
 
 def _at_end(
-    robot: LoadedRobot,
-    frame: str,
-    source: str,
-    radius: float | None,
-    offset: Array | None = None,
+    robot: LoadedRobot, frame: str, source: str, radius: float | None, offset: Array | None = None
 ) -> Tip:
     """Return a sphere at the end of the link of `frame`.
 
@@ -173,11 +166,9 @@ def _at_end(
 
 def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
     """Raise SphshellError for a sphere that is inside its own link, where it touches nothing."""
-    if joint_of(robot.model, tip.frame) == 0:
-        return
     link = LinkGeometry(robot, tip.frame)
     depth = link.depth(tip.offset)
-    if depth > AT_TIP * tip.radius:
+    if depth > AT_TIP * tip.radius and joint_of(robot.model, tip.frame):
         end = link.end()
         x, y, z = (float(f"{one:.4f}") + 0.0 for one in end.offset)
         raise SphshellError(
@@ -255,13 +246,10 @@ def _ends(model: pin.Model, held: Collection[int], limbs: Collection[int]) -> li
     free = floats(model)
     if free and only_turns(model):
         return [(frame_on_joint(model, 1) or model.names[1], "its body, beside rotors or wheels")]
-    leaves = sorted(_leaves(model, held), key=lambda j: -len(model.supports[j]))
+    leaves = sorted(_leaves(model, held), key=lambda j: (-len(model.supports[j]), j))
     carriers = {int(one.parentFrame) for one in model.frames}
-    childless = [
-        one
-        for i, one in enumerate(model.frames)
-        if int(one.parentJoint) in limbs and i not in carriers
-    ]
+    childless = [one for i, one in enumerate(model.frames) if i not in carriers]
+    childless = [one for one in childless if int(one.parentJoint) in limbs]
     names = [one.name for one in childless if int(one.parentJoint) in leaves]
     found = list[tuple[str, str]]()
     for word in () if free else _TOOL_WORDS:

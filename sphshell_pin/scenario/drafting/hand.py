@@ -1,13 +1,13 @@
 """A new scenario in which a hand holds a free part between all its fingertips."""
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
@@ -84,33 +84,19 @@ class HoldSearch(Search):
     def _grasps(self, tips: Sequence[Tip]) -> Iterator[Plan]:
         """Yield drafts in which all of the `tips` hold the part; say at the end why none works."""
         press, shell = self.asked.press, self.shell
-        sphere = find_material(self.asked.material or "rubber")
-        materials = Materials(sphere, find_material(self.asked.against or "steel"))
+        names = self.asked.material or "rubber", self.asked.against or "steel"
+        materials = Materials(*map(find_material, names))
         part, hand = Part.of(shell, materials.surface), Hand(self.model, tips)
-        total = (
-            _SAFETY * part.inertia.mass * GRAVITY / materials.friction
-            if press is None
-            else 2.0 * press
-        )
-        links, blocked, said = self.hold_links(tips, hand.lock, self.q0), list[str](), ""
-
-        def free(q: Array, placement: pin.SE3 | None = None) -> bool:
-            if placement is None:
-                return not links.crossed(q)
-            found = links.within(q, placement, whole=True)
-            blocked.extend([] if found is None else [found])
-            return found is None
-
-        found = grasps(hand, self.q0, shell, part.weight, total, materials.friction, GAP, free)
+        mu, weight = materials.friction, part.inertia.mass * GRAVITY
+        total = _SAFETY * weight / mu if press is None else 2.0 * press
+        links, said = self.hold_links(tips, hand.lock, self.q0), ""
+        found, blocked = grasps(hand, links, self.q0, part, total, mu, GAP)
         for one in found[:_MOST_RUNS]:
-            plan = _planned(
-                hand, _pressed(one, part, press, materials.friction), shell, part, materials
-            )
-            if isinstance(plan, str):
-                said = plan
-                continue
-            yield plan
-            said = self.faults[-1].text
+            try:
+                yield _planned(hand, _pressed(one, part, press, mu), shell, part, materials)
+                said = self.faults[-1].text
+            except SphshellError as error:
+                said = str(error)
         heavy = (
             f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
             "--against, another --press, or a smaller part"
@@ -118,10 +104,8 @@ class HoldSearch(Search):
         self.refused.append(TooHeavy(heavy) if found else _no_grasp(shell, len(tips), blocked))
 
 
-def _planned(
-    hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: Materials
-) -> Plan | str:
-    """Plan a scenario with the grasp; what is wrong with it before anything is run."""
+def _planned(hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: Materials) -> Plan:
+    """Plan a scenario with the grasp; SphshellError for what is wrong before anything is run."""
     model, forces, torques = hand.model, grasp.normal_forces(), hand.torques(grasp)
     radius, press = float(hand.radii.min()), float(forces.max())
     weight = pin.computeGeneralizedGravity(model, model.createData(), grasp.q)
@@ -129,9 +113,10 @@ def _planned(
     stated = (limits > 0) & (limits < NO_LIMIT)
     over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
     if len(over):
-        return f"the effort limit of {limits[over[0]]:g} N m allows no press of {press:.3g} N"
+        limit = f"the effort limit of {limits[over[0]]:g} N m"
+        raise SphshellError(f"{limit} allows no press of {press:.3g} N")
     if said := materials.too_deep(press, radius):
-        return said
+        raise SphshellError(said)
     kp = rounded(float(np.abs(torques).max()) / _DRAWN)
     inertia = np.diag(mass_matrix(model, grasp.q))[hand.reaches[0].columns]
     kd = rounded(1.4 * math.sqrt(kp * float(np.median(inertia))))
@@ -141,33 +126,23 @@ def _planned(
     deep = grasp.q if pressed is None else pressed[0]
     angles = coordinates(model, pin.integrate(model, deep, torques / kp))
     drawn = {f"hand/{name}": angles[name] for name in (model.names[j] for j in hand.joints)}
-    used = grasp.friction / materials.friction
+    used, mass = grasp.friction / materials.friction, part.inertia.mass
     frames = ", ".join(f"'{tip.frame}'" for tip in hand.tips)
     why = (
         f"{len(hand.tips)} fingertips, {hand.tips[0].source}: {frames}",
-        f"the part is {materials.surface.name} all through and weighs {part.inertia.mass:.3g} kg",
+        f"the part is {materials.surface.name} all through and weighs {mass:.3g} kg",
         f"the fingertips press with {press:.3g} N at most; its weight and their forces use "
         f"{100 * used:.0f} % of the friction",
     )
-    return Plan(
-        hand.tips,
-        materials.sticking(radius, 0.1, press, part.inertia.mass / len(hand.tips)),
-        Hold(kp, kd, _DRAWN, drawn, press),
-        DURATION,
-        GAP,
-        grasp.q,
-        hand.lock,
-        grasp.placement,
-        why,
-        part,
-        strongest=int(np.argmax(forces)),
-    )
+    contact, k = materials.sticking(radius, 0.1, press, mass / len(hand.tips)), int(forces.argmax())
+    start = DURATION, GAP, grasp.q, hand.lock, grasp.placement
+    control = Hold(kp, kd, _DRAWN, drawn, press)
+    return Plan(hand.tips, contact, control, *start, why, part, strongest=k)
 
 
-def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> SphshellError:
-    sizes = " x ".join(f"{1e3 * one:.3g}" for one in shell.box[1] - shell.box[0])
-    if blocked:
-        link = max(set(blocked), key=blocked.count)
+def _no_grasp(shell: Shell, count: int, blocked: Counter[str]) -> SphshellError:
+    sizes = " x ".join(f"{1e3 * one:.3g}" for one in np.ptp(shell.box, axis=0))
+    for link, _ in blocked.most_common(1):
         return SphshellError(
             f"link '{link}' would be in the part, or another one, wherever all {count} fingertips "
             f"touch it and could hold it: take a part of another size than {sizes} mm"

@@ -76,21 +76,21 @@ def gripper_joints(model: pin.Model) -> set[int]:
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
+    slide = {j for j in range(model.njoints) if _slides(model.joints[j])}
     for carrier in range(1, model.njoints):
-        behind = [int(one) for one in model.subtrees[carrier]][1:]
-        ends = set(behind) - {int(model.parents[one]) for one in behind}
-        jaws = {
-            one
-            for one in behind
-            if model.names[one] in coupled
-            or model.joints[one].shortname().startswith("JointModelP")
-        }
+        behind = set(map(int, model.subtrees[carrier])) - {carrier}
+        ends = behind - {int(model.parents[one]) for one in behind}
+        jaws = {one for one in behind if model.names[one] in coupled} | (behind & slide)
         few = len({model.joints[one].idx_v for one in behind}) <= 3
+        sliding = few and len(ends & jaws) > 1 and behind == ends | jaws
         named = all("gripper" in model.names[one].lower() for one in behind)
-        sliding = few and len(ends & jaws) > 1 and set(behind) == ends | jaws
         if len(ends) > 1 and (named or sliding):
-            found |= set(behind)
+            found |= behind
     return found
+
+
+def _slides(joint: pin.JointModel) -> bool:
+    return bool(joint.shortname().startswith("JointModelP"))
 
 
 class LinkGeometry:
@@ -105,15 +105,12 @@ class LinkGeometry:
         self._robot, self._model = robot, model
         self._frame = model.frames[find_frame(model, frame)]
         self._joint = int(self._frame.parentJoint)
-        self._jaws = gripper_joints(model) & {int(one) for one in model.subtrees[self._joint]}
-        self._jaws -= {self._joint}
-        both = robot.collision_model, robot.visual_model
-        shown = [int(one.parentFrame) for each in both for one in each.geometryObjects]
-        bodies = [k for k in sorted(shown) if model.frames[k].parentJoint == self._joint]
-        self.link = model.frames[bodies[0]].name if bodies else frame
-        self.corners = moved(
-            self._frame.placement.inverse(), self._corners(self._joint, {self._joint, *self._jaws})
-        )
+        self._jaws = gripper_joints(model) & set(model.subtrees[self._joint]) - {self._joint}
+        both = [*robot.collision_model.geometryObjects, *robot.visual_model.geometryObjects]
+        shown = [int(one.parentFrame) for one in both if one.parentJoint == self._joint]
+        self.link = model.frames[min(shown)].name if shown else frame
+        corners = self._corners(self._joint, {self._joint, *self._jaws})
+        self.corners = moved(self._frame.placement.inverse(), corners)
 
     def depth(self, center: Array) -> float:
         """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
@@ -167,7 +164,7 @@ class LinkGeometry:
             return unit(place.rotation @ (_middle(jaws) - _middle(wrist)))
         joint = model.joints[self._joint]
         if joint.nv == 6:
-            return np.asarray(place.rotation @ np.array([0.0, 0.0, -1.0]))
+            return np.asarray(-place.rotation[:, 2])
         parent = int(model.parents[self._joint])
         before = self._corners(parent, {parent})
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
@@ -176,10 +173,8 @@ class LinkGeometry:
             motion = np.ravel(joint.createData().S)
             axis = place.rotation @ (motion[:3] + motion[3:])
             aside = (here - origin) - axis * (axis @ (here - origin))
-            if joint.shortname().startswith("JointModelP"):
-                aside = np.zeros(3)
             size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
-            if np.linalg.norm(aside) >= _AT_AXIS * size:
+            if not _slides(joint) and np.linalg.norm(aside) >= _AT_AXIS * size:
                 away = aside
             elif self._moves_along(axis):
                 away = axis * np.sign(axis @ away or 1.0)
@@ -191,8 +186,8 @@ class LinkGeometry:
         """Whether the frame can move along an `axis` (3,): a mechanism in a plane does not."""
         reach = Reach(self._model, self._frame.name, np.zeros(3))
         q = pin.integrate(self._model, self._robot.q0, np.full(self._model.nv, 0.3))
-        jacobian, pose = reach.jacobian(q)[:3], reach.data.oMf[reach.frame]
-        return bool(np.abs(pose.rotation @ axis @ jacobian).max(initial=0.0) > _STILL)
+        moves = reach.jacobian(q)[:3].T @ reach.data.oMf[reach.frame].rotation @ axis
+        return bool(np.abs(moves).max(initial=0.0) > _STILL)
 
     def _corners(self, joint: int, joints: Collection[int]) -> Array:
         """Return the corners (k, 3) [m] of the geometry of `joints`, in the frame of `joint`."""
@@ -213,9 +208,7 @@ class LinkGeometry:
 
 
 def _middle(points: Array) -> Array:
-    if not len(points):
-        return np.zeros(3)
-    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
+    return 0.5 * (points.min(axis=0) + points.max(axis=0)) if len(points) else np.zeros(3)
 
 
 def _smallest_ball(points: Array) -> tuple[Array, float]:

@@ -108,11 +108,10 @@ def _written(asked: Asked) -> NewScenario:
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
-    if asked.tip is not None:
-        tips = [asked.tip]
-    elif in_hand:
+    tips: Sequence[Tip] = [asked.tip] if asked.tip is not None else ()
+    if in_hand:
         tips = every_tip(loaded, asked)
-    else:
+    elif not tips:
         tips = find_tips(
             loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
@@ -129,17 +128,14 @@ def _written(asked: Asked) -> NewScenario:
             error.args = (f"{error}; or let it float, --base floating",)
         raise
     if made.part:
-        part = file.with_name(part_file(file.stem))
-        _check_free(part, force=asked.force)
-        write_whole(part, made.part.encode())
+        write_whole(file.with_name(part_file(file.stem)), made.part.encode())
     write_whole(file, made.text.encode())
-    shape = f"the base is {shaped}, by the robot's shape: or --base" if shaped else ""
+    shape = f"the base is {shaped}, by the robot's shape: or --base"
     masses = loaded.assumed
-    if masses and asked.density is None:
-        masses += ": another with --density"
+    masses += ": another with --density" if masses and asked.density is None else ""
     idle = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
     idle = idle and f"held, as nothing that they move has a mass: joints {idle}"
-    return replace(made, why=("" if in_hand else shape, *made.why, masses, idle))
+    return replace(made, why=(shape if shaped and not in_hand else "", *made.why, masses, idle))
 
 
 def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
@@ -162,28 +158,27 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     return section, bare, shaped
 
 
-def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
+def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> Sequence[Tip]:
     """Return the `tips`, balls of free size that press on a file's surface as it needs them.
 
     A round end that is larger than the surface gets a smaller ball on it.
     """
-    stated = asked.radius is not None or asked.tip is not None
-    if asked.word is not None or asked.tips == "all" or stated:
-        return list(tips)
-    (made,) = built.shells.values()
+    (made,), floating = built.shells.values(), floats(built.assembly.model)
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
-    floating = floats(built.assembly.model)
+    stated = asked.radius is not None or asked.tip is not None or asked.tips == "all"
+    if asked.word is not None or stated:
+        return tips
     most = rounded(
         0.5 * made.size if floating else min(_BALL * middle, _OF_ROOM * widest_room(made))
     )
-    sized = list[Tip]()
-    for tip in tips:
+
+    def sized(tip: Tip) -> Tip:
         large = tip.radius > made.size
-        if most and large and tip.end == "round":
-            sized.append(LinkGeometry(built.assembly.loaded[0], tip.frame).end(most))
-        else:
-            sized.append(tip.at_most(most) if most and (large or not floating) else tip)
-    return sized
+        if large and tip.end == "round":
+            return LinkGeometry(built.assembly.loaded[0], tip.frame).end(most)
+        return tip.at_most(most) if large or not floating else tip
+
+    return [sized(tip) for tip in tips] if most else tips
 
 
 def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
@@ -200,18 +195,11 @@ def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
         )
     if not made.is_closed:
         return built
-    side = "inside" if inside else "outside"
+    side = {"side": "inside" if inside else "outside"}
     # The surface is not read again.
-    turned = made.from_surface(made.surface(), **{**made.options, "side": side})
-    scenario = built.scenario.model_copy(
-        update={"shell": [section.model_copy(update={"side": side})]}
-    )
+    turned = made.from_surface(made.surface(), **{**made.options, **side})
+    scenario = built.scenario.model_copy(update={"shell": [section.model_copy(update=side)]})
     return replace(built, scenario=scenario, shells={section.name: turned})
-
-
-def _check_free(path: Path, *, force: bool) -> None:
-    if path.is_dir() or (path.exists() and not force):
-        raise ScenarioError(path, "", "is there already: give another --out, or --force")
 
 
 def _free_path(asked: Asked) -> Path:
@@ -219,7 +207,10 @@ def _free_path(asked: Asked) -> Path:
     path = Path(f"{robot}_on_{surface}.toml" if asked.out is None else asked.out)
     if path.suffix != ".toml":
         raise ScenarioError(path, "", "a scenario's file must end in .toml")
-    _check_free(path, force=asked.force)
+    part = [path.with_name(part_file(path.stem))] if asked.tips == "all" else []
+    for one in (path, *part):
+        if one.is_dir() or (one.exists() and not asked.force):
+            raise ScenarioError(one, "", "is there already: give another --out, or --force")
     if not path.parent.is_dir():
         raise ScenarioError(path, "", f"the folder {path.parent} does not exist")
     return path
@@ -235,10 +226,11 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
                 f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot), base=base, mimic=asked.mimic)
-    place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
+    source: dict[str, Any] = {
+        "urdf" if file.suffix.lower() == ".urdf" else "file": _relative(file, path)
+    }
     return RobotSection(
-        urdf=place if is_urdf else None,
-        file=None if is_urdf else place,
+        **source,
         package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
         base=base,
@@ -310,7 +302,7 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
     if asked.tips == "one":
         centers = sphere_centers(built.assembly.model, built.assembly.q0, tips)
         spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
-        half = _round_up(max(_SIZE * largest, spread))
+        half = rounded(1.05 * max(_SIZE * largest, spread))
         length = (0.4 if word == "box" else 2.0) * half
     primitives: dict[str, Primitive] = {
         "plane": HalfSpace(2 * half),
@@ -320,9 +312,3 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         "cylinder": Cylinder(radius=half, length=length),
     }
     return ShellSection(name=word, primitive=primitives[word])
-
-
-def _round_up(x: float) -> float:
-    """Round to the next higher number of two digits."""
-    rounded = float(f"{x:.2g}")
-    return rounded if rounded >= x else float(f"{1.05 * x:.2g}")

@@ -62,16 +62,14 @@ class Place:
     @property
     def told(self) -> str:
         """A sentence that says how the part stands."""
-        up = self.placement.rotation[:, 2] @ np.eye(3)[2]
-        name = axis_name(self.side)
-        side = f"{name} side" if name else "touched place"
-        stands = "upright, as in its file" if up > 0.999 else f"with its {side} towards the tip"
+        side = f"{axis_name(self.side)} side" if axis_name(self.side) else "touched place"
+        upright = self.placement.rotation[2, 2] > 0.999
+        stands = "upright, as in its file" if upright else f"with its {side} towards the tip"
         if abs(self.raised) < 1e-4:
             return f"the surface stands {stands}, on the floor of the robot's base"
-        how = "above" if self.raised > 0 else "below"
+        high = f"{mm(abs(self.raised))} {'above' if self.raised > 0 else 'below'} the floor of the"
         return (
-            f"the surface stands {stands}, {1e3 * abs(self.raised):.3g} mm {how} the floor of the "
-            "robot's base: there the tip would not come to it"
+            f"the surface stands {stands}, {high} robot's base: there the tip would not come to it"
         )
 
 
@@ -83,49 +81,36 @@ class Bench:
     """
 
     def __init__(self, links: Links, limb: Limb, q: Array, depth: float) -> None:
-        self.q, self._limb, self._links, self._shell = q, limb, links, links.shell
-        self._depth = depth
+        self.q, self._limb, self._links, self._depth = q, limb, links, depth
         self._found: dict[tuple[float | None, ...], list[Stance]] = {}
         # What was come across: postures, places that were tried, and links that were in the part.
         self.postures, self.tried, self.blocked = 0, 0, Counter[str]()
         self._covered: list[tuple[Stance, pin.SE3, bool]] = []
 
     def places(
-        self,
-        side: Array,
-        spots: Sequence[TouchPoint],
-        approach: Array,
-        *,
-        on_floor: bool,
-        room: float,
+        self, side: Array, spots: Sequence[TouchPoint], approach: Array, on_floor: bool, room: float
     ) -> Iterator[Place]:
         """Yield places where the part has `side` (3,) to a tip that presses along `approach` (3,).
 
         It stands on the floor, or wherever the posture has the tip, `room` [m] before the links.
         First those of each posture where the sphere touches one face.
         """
-        facing = turned_to(side, -approach)
-        lowest = float((self._shell.vertices @ facing.T)[:, 2].min())
+        links, shell, facing = self._links, self._links.shell, turned_to(side, -approach)
+        above = links.floor - float((shell.vertices @ facing[2]).min())
+        heights = [above + float(facing[2] @ spot.center) if on_floor else None for spot in spots]
         uneven: list[Place] = []
         most = self.tried + (_FEWER if self.tried > _MANY else _MOST_TRIED)
-
-        def height(spot: TouchPoint) -> float | None:
-            return self._links.floor - lowest + float(facing[2] @ spot.center) if on_floor else None
-
-        for posture in self._stances(approach, height(spots[0])):
+        for posture in self._stances(approach, heights[0]):
             self.postures += 1
             offered = 0
-            for spot in spots:
-                on_face = bool(
-                    spot.normal @ side > _STEEP
-                    and touches_once(
-                        self._shell, spot, spot.point[None], self._limb.tip.radius, self._depth
-                    )
+            for spot, z in zip(spots, heights, strict=True):
+                faces, tip = spot.normal @ side > _STEEP, self._limb.tip
+                on_face = faces and touches_once(
+                    shell, spot, spot.point[None], tip.radius, self._depth
                 )
                 # What moves along one line alone presses along the normal there.
                 line = posture.slide is None
-                z = None if line else height(spot)
-                at = posture.center if z is None else np.array([*posture.center[:2], z])
+                at = posture.center if line or z is None else np.array([*posture.center[:2], z])
                 stance = posture.at(at)
                 if stance is None or (not on_face and uneven):
                     continue
@@ -137,14 +122,14 @@ class Bench:
                     self.tried += 1
                     # With a little room, as the tip yields when it is pressed on and slides.
                     part = nearer(placement, room * stance.approach)
-                    found = self._links.within(stance.q, part, whole=True)
+                    found = links.within(stance.q, part, whole=True)
                     if found is not None:
                         self.blocked[found] += 1
-                        self._covered.append((stance, part, on_face))
+                        self._covered.append((stance, part, bool(on_face)))
                         continue
-                    bottom = float((self._shell.vertices @ turned.T)[:, 2].min())
-                    raised = bottom + float(placement.translation[2]) - self._links.floor
-                    place = Place(stance, spot, placement, on_face, raised, front)
+                    bottom = float((shell.vertices @ turned[2]).min())
+                    raised = bottom + float(placement.translation[2]) - links.floor
+                    place = Place(stance, spot, placement, bool(on_face), raised, front)
                     if on_face:
                         yield place
                         offered += 1
@@ -180,18 +165,14 @@ class Bench:
     def _stances(self, approach: Array, height: float | None) -> list[Stance]:
         """Return postures for an approach, at a `height` [m] above the floor if it is given."""
         key = (*approach, height)
-        if key not in self._found:
-            limit = None if height is None else self._links.floor
-            self._found[key] = stances(
-                self._limb, self.q, approach, height, lambda q: self._usable(q, limit)
-            )
-        return self._found[key]
 
-    def _usable(self, q: Array, floor: float | None) -> bool:
-        """Whether links are free of each other and above the `floor` [m] at q (nq,)."""
-        if self._links.crossed(q):
-            return False
-        return floor is None or self._links.lowest(q) > floor - _AT_FLOOR
+        def usable(q: Array) -> bool:
+            low = height is not None and self._links.lowest(q) <= self._links.floor - _AT_FLOOR
+            return not (low or self._links.crossed(q))
+
+        if key not in self._found:
+            self._found[key] = stances(self._limb, self.q, approach, height, usable)
+        return self._found[key]
 
 
 def nearer(placement: pin.SE3, way: Array) -> pin.SE3:

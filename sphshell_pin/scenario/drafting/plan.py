@@ -112,7 +112,7 @@ class Press:
         self.rotational_damping = rounded(2 * self.damped * math.sqrt(turning * stance.inertia))
         # The posture's pull may take a fiftieth of the normal force at the end of the path.
         pull = min(0.02 * force / (stance.mass * max(self.way.length, radius)), 100.0)
-        pull = pull if stance.joints > (6 if turning else 3) else 0.0
+        pull = pull if len(stance.joint_inertia) > (6 if turning else 3) else 0.0
         joints = stance.joint_inertia
         self.posture_stiffness = [] if self.calm else [rounded(pull * one) for one in joints]
         self.joint_damping = [rounded(0.7 * math.sqrt(pull) * one) for one in joints]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
@@ -19,7 +20,7 @@ from sphshell_pin.scenario.drafting.plan import TIP_GAP, Plan, Press, press_forc
 from sphshell_pin.scenario.drafting.poses import Limb, approaches
 from sphshell_pin.scenario.drafting.searching import CannotReach, Search
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
-from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
+from sphshell_pin.scenario.drafting.touch_points import TouchPoint, sides, touch_points
 from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
@@ -55,9 +56,8 @@ def repaired(one: Press, fault: Fault) -> Press | None:
     count = int((along < _CUT * one.speed * (fault.t - one.lead_in)).sum())
     if along[max(count - 1, 0)] < SHORTEST_PATH * one.place.stance.tip.radius:
         return None
-    return replace(
-        one, way=replace(one.way, points=one.way.points[:count], why=fault.text), repair="cut"
-    )
+    way = replace(one.way, points=one.way.points[:count], why=fault.text)
+    return replace(one, way=way, repair="cut")
 
 
 class PressSearch(Search):
@@ -115,19 +115,17 @@ class PressSearch(Search):
                 still.append(one)
             if len(self.faults) >= _MOST_SLIDES or len(still) >= _MOST_STILL:
                 break
-        if self.asked.slides:
-            self.refused += [
-                f"the path cannot be taken: {one.way.why}; {_ADVICE['path']}" for one in still
-            ]
-        else:
+        if not self.asked.slides:
             yield from [*self.stays, *still]
+        elif still:
+            why = still[0].way.why
+            self.refused.append(f"the path cannot be taken: {why}; {_ADVICE['path']}")
 
     def _everywhere(self) -> Iterator[Press]:
         """Yield what presses in each place, with the longest path there."""
         asked, radius = self.asked, self.tip.radius
         for found in self._places():
-            stance = found.stance
-            pair = chosen_materials(asked, [self.tip], stance.mass)
+            stance, pair = found.stance, chosen_materials(asked, [self.tip], found.stance.mass)
             try:
                 force = press_force(stance, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
@@ -145,20 +143,18 @@ class PressSearch(Search):
 
         The tip presses down if nothing else is asked for, else as its limb points, else sideways.
         """
-        asked, shell, tip = self.asked, self.shell, self.tip
-        gap = TIP_GAP * tip.radius
-        directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
-        pressed = approaches(self.limb, self.bench.q, directions)
-        if asked.fixed:
-            spots = asked_touches(asked, shell, tip.radius, gap)
-            choices = [(nearest_side(spots[0].normal), spots)]
+        asked, shell, radius = self.asked, self.shell, self.tip.radius
+        gap, choices = TIP_GAP * radius, list[tuple[Array, list[TouchPoint]]]()
+        if asked.at is not None or isinstance(asked.path, np.ndarray):
+            spots = asked_touches(asked, shell, radius, gap)
+            choices.append((nearest_side(spots[0].normal), spots))
         else:
-            side = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
-            choices = [
-                (one, list(touch_points(shell, tip.radius, gap, toward=one, inside=asked.inside)))
-                for one in (sides(shell) if side is None else [side])
-            ]
-        for approach in pressed[:1] if asked.place else pressed:
+            word = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
+            for side in sides(shell) if word is None else [word]:
+                spots = list(touch_points(shell, radius, gap, toward=side, inside=asked.inside))
+                choices.append((side, spots))
+        place = PLACES.get(asked.place or "")
+        for approach in [np.array(place)] if place else approaches(self.limb, self.bench.q):
             # Upright ones first, as they stand in their file.
             ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
             tries = itertools.product((self.room, 0.0), ordered, (True, False))

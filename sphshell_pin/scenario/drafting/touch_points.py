@@ -72,8 +72,7 @@ def sides(shell: Shell) -> list[Array]:
     outward = _bulge(shell)
     if outward is not None:
         return [nearest_axis(outward)]
-    sizes = shell.box[1] - shell.box[0]
-    broad = [float(np.prod(np.delete(sizes, k))) for k in range(3)]
+    broad = [float(np.prod(np.delete(np.ptp(shell.box, axis=0), k))) for k in range(3)]
     axes = [sign * np.eye(3)[k] for sign in (1.0, -1.0) for k in (2, 1, 0)]
 
     def rank(axis: Array) -> tuple[bool, float]:
@@ -118,10 +117,8 @@ def roomy_places(shell: Shell, facets: NDArray[np.bool_]) -> tuple[list[Array], 
     total = np.zeros((len(ends), 3))
     np.add.at(total, owner.ravel(), np.repeat(normals[facing], 3, axis=0))
     sharp = (count != 2) | (np.linalg.norm(total, axis=1) < 2 * np.cos(0.5 * _SHARP_ANGLE))
-    start, along = (
-        shell.vertices[ends[sharp, 0]],
-        np.diff(shell.vertices[ends[sharp]], axis=1)[:, 0],
-    )
+    start, end = np.moveaxis(shell.vertices[ends[sharp]], 1, 0)
+    along = end - start
     some = rng.choice(facing, _SAMPLES, p=areas[facing] / areas[facing].sum())
     points = np.einsum("ij,ijk->ik", rng.dirichlet(np.ones(3), _SAMPLES), corners[some])
     room = np.full(_SAMPLES, np.inf)
