@@ -152,12 +152,19 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
     assert build(made.path).scene.model.nv <= 4
 
 
-@pytest.mark.parametrize("geometry", ['<sphere radius="0.06"/>', '<box size="0.2 0.2 0.2"/>'])
+@pytest.mark.parametrize(
+    ("kind", "geometry"),
+    [
+        ("visual", '<sphere radius="0.06"/>'),
+        ("collision", '<sphere radius="0.06"/>'),
+        ("visual", '<box size="0.2 0.2 0.2"/>'),
+    ],
+)
 @pytest.mark.parametrize("floats", [False, True])
-def test_an_end_larger_than_the_part_gets_a_smaller_ball(geometry, floats, tmp_path):
+def test_an_end_larger_than_the_part_gets_a_smaller_ball(kind, geometry, floats, tmp_path):
     """Round ones too, and that of a body that falls."""
     mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    visual = f"<visual><geometry>{geometry}</geometry></visual>"
+    visual = f"<{kind}><geometry>{geometry}</geometry></{kind}>"
     link = f'<link name="b">{mass}</inertial>{visual}</link>'
     joint = '<link name="a"/><joint name="j" type="prismatic"><parent link="a"/><child link="b"/>'
     joint += '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="99" velocity="9"/></joint>'

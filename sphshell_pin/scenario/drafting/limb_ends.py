@@ -96,7 +96,8 @@ def _slides(joint: pin.JointModel) -> bool:
 class LinkGeometry:
     """The corners of the geometry that moves with a frame of a robot, in that frame.
 
-    A gripper that it carries is part of it, as the start has it. They are those of its collision
+    A gripper that it carries is part of it, as the start has it; of a free body all that it
+    carries. They are those of its collision
     geometry; where it has none, of its visual one.
     """
 
@@ -105,7 +106,11 @@ class LinkGeometry:
         self._robot, self._model = robot, model
         self._frame = model.frames[find_frame(model, frame)]
         self._joint = int(self._frame.parentJoint)
-        self._jaws = gripper_joints(model) & set(model.subtrees[self._joint]) - {self._joint}
+        behind = set(model.subtrees[self._joint]) - {self._joint}
+        # All that a free body carries is held.
+        self._free = model.joints[self._joint].nv == 6
+        self._on_rim = False
+        self._jaws = behind if self._free else behind & gripper_joints(model)
         both = [*robot.collision_model.geometryObjects, *robot.visual_model.geometryObjects]
         shown = [int(one.parentFrame) for one in both if one.parentJoint == self._joint]
         self.link = model.frames[min(shown)].name if shown else frame
@@ -141,12 +146,12 @@ class LinkGeometry:
             if 0 < covers <= reach:  # not on a corner alone
                 break
         before = float(along.max() - center @ ahead)
-        # Open jaws may lie in a ball, but are no round end.
-        if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
+        # Open jaws may lie in a ball, but are no round end; a ball about its axis would not move.
+        fits = covers - before < _STANDS_OUT * covers and not self._on_rim
+        if radius is None and fits and (self._free or not self._jaws):
             covering = f"it covers the end of link '{self.link}'"
             return Tip(name, rounded(covers), center, covering, end="round")
-        floats = self._model.joints[self._joint].nv == 6
-        least = _OF_BODY * size if floats else 0.0
+        least = _OF_BODY * size if self._free else 0.0
         ball = rounded(max(_BALL * covers, least)) if radius is None else radius
         front, still = center + (before + ball) * ahead, ahead if radius is None else None
         return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, "flat")
@@ -155,16 +160,17 @@ class LinkGeometry:
         """Return the unit vector (3,) towards the end, in the frame.
 
         To the jaws of a gripper; of a body that floats down. Else away from the joint's axis;
-        along it where the link is about it, away from the link before.
+        along it where the link is about it, away from the link before; if the frame cannot move
+        along it, to the rim.
         """
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
+        if self._free:
+            return np.asarray(-place.rotation[:, 2])
         if self._jaws:
             jaws, wrist = (self._corners(self._joint, one) for one in (self._jaws, {self._joint}))
             return unit(place.rotation @ (_middle(jaws) - _middle(wrist)))
         joint = model.joints[self._joint]
-        if joint.nv == 6:
-            return np.asarray(-place.rotation[:, 2])
         parent = int(model.parents[self._joint])
         before = self._corners(parent, {parent})
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
@@ -180,6 +186,9 @@ class LinkGeometry:
                 away = axis * np.sign(axis @ away or 1.0)
             else:
                 away = away - axis * (axis @ away)
+                if np.linalg.norm(away) < _AT_AXIS * size:  # a disc ends anywhere on its rim
+                    rim = self.corners - origin - np.outer((self.corners - origin) @ axis, axis)
+                    away, self._on_rim = rim[int(np.argmax(np.linalg.norm(rim, axis=1)))], True
         return unit(away)
 
     def _moves_along(self, axis: Array) -> bool:

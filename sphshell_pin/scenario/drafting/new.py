@@ -174,7 +174,7 @@ def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> Sequence[Tip]:
 
     def sized(tip: Tip) -> Tip:
         large = tip.radius > made.size
-        if large and tip.end == "round":
+        if large and tip.ahead is None and asked.offset is None:
             return LinkGeometry(built.assembly.loaded[0], tip.frame).end(most)
         return tip.at_most(most) if large or not floating else tip
 

@@ -25,9 +25,9 @@ _STEEP = 0.8
 # Places and turns at which links are held against the part: of one side and height, of these once
 # so many were tried in all, and places of one posture that are offered.
 _MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 16, 1000, 2
-# Lengths of stubs that carry a ball out of its limb, in radii, and at how many of the places that
-# were tried they are looked for.
-_STUBS, _LOOKED = 1.5 ** np.arange(1.0, 13.0), 200
+# Lengths of stubs that carry a ball out of its limb, in radii, which one may have that is longer
+# than the limb, and at how many of the places that were tried they are looked for.
+_STUBS, _LONG, _LOOKED = 1.5 ** np.arange(1.0, 13.0), 20.0, 200
 # How far joints may be under the floor [m]: not at all, but for rounding.
 _AT_FLOOR = 1e-6
 
@@ -145,15 +145,14 @@ class Bench:
     def out_of_limb(self) -> Tip | None:
         """Return the ball on the shortest stub with which the links would be free of the part.
 
-        None where that would be longer than the limb at each place that was tried.
+        None where that would be too long at each place that was tried.
         """
         tip, even = self._limb.tip, [one for one in self._covered if one[2]] or self._covered
         for length in [rounded(one) for one in _STUBS * tip.radius]:
             for stance, part, _ in even[:: len(even) // _LOOKED + 1]:
                 away = -length * stance.approach
-                if length > stance.reach or self._links.within(
-                    stance.q, nearer(part, away), whole=True
-                ):
+                longest = max(stance.reach, _LONG * tip.radius)
+                if length > longest or self._links.within(stance.q, nearer(part, away), whole=True):
                     continue
                 self._limb.center(stance.q)
                 ahead = self._limb.data.oMf[self._limb.frame].rotation.T @ stance.approach
