@@ -377,3 +377,11 @@ def test_a_tip_may_stay_behind_the_end_of_its_path_by_a_part_of_its_radius(aside
     fault = _path_fault(SimpleNamespace(scene=scene), plan, result)
     assert (fault is not None) == told
     assert not told or "33 mm behind the end of its path" in fault.text
+
+
+def test_a_force_that_comes_late_gets_more_time_once():
+    press = pressing(PATH[:1], repair="stays")
+    late = Fault("force", "it is low", 0.6 * press.lead_in)
+    slower = repaired(press, late)
+    assert slower.force_rise == pytest.approx(2 * press.force_rise)
+    assert repaired(slower, late) is None

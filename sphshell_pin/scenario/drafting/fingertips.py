@@ -71,10 +71,8 @@ def find_tips(
         known = [replace(known[0], offset=offset, source=_ASKED)]
     elif radius and shipped is None:
         # A smaller sphere than that of the collision geometry would be inside it.
-        known = [
-            _at_end(robot, one.frame, _SMALLER, radius) if radius < one.radius else one
-            for one in known
-        ]
+        for k, one in enumerate(known):
+            known[k] = _at_end(robot, one.frame, _SMALLER, radius) if radius < one.radius else one
     if not known:
         ends = [(frame, _ASKED)] if frame else _ends(model, held, limbs)
         chosen = ends if floats(model) else ends[:1]
@@ -83,11 +81,17 @@ def find_tips(
             bottoms = sphere_centers(model, robot.q0, known)[:, 2] - [one.radius for one in known]
             low = bottoms <= bottoms.min() + _AS_LOW * model_reach(model)
             known = [known[k] for k in np.flatnonzero(low)]
-    found = [_sized(one, radius) for one in known]
+    for k, one in enumerate(known):
+        if radius is None:
+            break
+        # A center that stands one radius before the frame goes on touching it.
+        touching = one.radius and abs(np.linalg.norm(one.offset) - one.radius) < 1e-9
+        at = one.offset * (radius / one.radius) if touching else one.offset
+        known[k] = Tip(one.frame, radius, at, one.source)
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
-    for one in found if shipped is None or offset is not None else ():
+    for one in known if shipped is None or offset is not None else ():
         _check_outside(robot, one)
-    return found
+    return known
 
 
 def other_ends(model: pin.Model, frame: str) -> list[str]:
@@ -188,15 +192,6 @@ def _outermost(model: pin.Model, tips: Sequence[Tip]) -> list[Tip]:
 
     beside = [t for t in tips if joint_of(model, t.frame) == joint_of(model, tips[0].frame)]
     return sorted(beside, key=away, reverse=True)[:1]
-
-
-def _sized(tip: Tip, radius: float | None) -> Tip:
-    if radius is None:
-        return tip
-    # A center that stands one radius before the frame goes on touching it.
-    touching = tip.radius and abs(np.linalg.norm(tip.offset) - tip.radius) < 1e-9
-    offset = tip.offset * (radius / tip.radius) if touching else tip.offset
-    return Tip(tip.frame, radius, offset, tip.source)
 
 
 def _leaves(model: pin.Model, held: Collection[int] = ()) -> set[int]:

@@ -97,8 +97,7 @@ class LinkGeometry:
     """The corners of the geometry that moves with a frame of a robot, in that frame.
 
     A gripper that it carries is part of it, as the start has it; of a free body all that it
-    carries. They are those of its collision
-    geometry; where it has none, of its visual one.
+    carries. They are those of its collision geometry; where it has none, of its visual one.
     """
 
     def __init__(self, robot: LoadedRobot, frame: str) -> None:
@@ -109,20 +108,22 @@ class LinkGeometry:
         behind = set(model.subtrees[self._joint]) - {self._joint}
         # All that a free body carries is held.
         self._free = model.joints[self._joint].nv == 6
-        self._on_rim = False
-        self._jaws = behind if self._free else behind & gripper_joints(model)
+        self._on_rim, jaws = False, behind & gripper_joints(model)
+        self._jaws = behind if self._free else jaws
         both = [*robot.collision_model.geometryObjects, *robot.visual_model.geometryObjects]
         shown = [int(one.parentFrame) for one in both if one.parentJoint == self._joint]
         self.link = model.frames[min(shown)].name if shown else frame
-        corners = self._corners(self._joint, {self._joint, *self._jaws})
-        self.corners = moved(self._frame.placement.inverse(), corners)
+        self.corners, self._solid = (
+            moved(self._frame.placement.inverse(), self._corners(self._joint, {self._joint, *held}))
+            for held in (self._jaws, jaws)
+        )
 
     def depth(self, center: Array) -> float:
-        """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
+        """Return how far `center` (3,) [m] is in the link's convex hull [m]; negative outside."""
         from scipy.spatial import ConvexHull, QhullError
 
         try:
-            hull = ConvexHull(self.corners)
+            hull = ConvexHull(self._solid)
         except (QhullError, ValueError):  # flat, or nothing
             return -math.inf
         return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())

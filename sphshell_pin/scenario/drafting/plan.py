@@ -76,7 +76,7 @@ class Press:
     weak: bool = False
     lead_in: float = 0.0
     calm: bool = False
-    repair: Literal["", "calmed", "cut", "stays"] = ""
+    repair: Literal["", "calmed", "cut", "stays", "slower"] = ""
     hollow: bool = False
 
     def __post_init__(self) -> None:

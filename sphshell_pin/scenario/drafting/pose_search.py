@@ -11,7 +11,6 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
-from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.fingertips import other_ends
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
@@ -20,7 +19,12 @@ from sphshell_pin.scenario.drafting.plan import TIP_GAP, Plan, Press, press_forc
 from sphshell_pin.scenario.drafting.poses import Limb, approaches
 from sphshell_pin.scenario.drafting.searching import CannotReach, Search
 from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
-from sphshell_pin.scenario.drafting.touch_points import TouchPoint, sides, touch_points
+from sphshell_pin.scenario.drafting.touch_points import (
+    TouchPoint,
+    asked_touches,
+    sides,
+    touch_points,
+)
 from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
@@ -47,7 +51,9 @@ _ADVICE = {
 
 def repaired(one: Press, fault: Fault) -> Press | None:
     """Return what to try in place of a draft that failed; None: nothing."""
-    if one.repair in ("stays", "cut"):
+    if one.repair == "stays" and fault.kind == "force" and 0.0 < fault.t < one.lead_in:
+        return replace(one, lead_in=2 * one.lead_in, repair="slower")
+    if one.repair in ("stays", "slower", "cut"):
         return None
     if fault.kind == "force" and not one.repair:
         return replace(one, calm=True, repair="calmed")
