@@ -61,7 +61,7 @@ class Grasp:
 
     def normal_forces(self) -> Array:
         """Return the normal force (k,) [N] of each tip."""
-        return np.asarray(-np.einsum("ki,ki->k", self.forces, self.normals))
+        return np.asarray(-(self.forces * self.normals).sum(axis=1))
 
 
 class Hand:

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.regular_file import why_no_file
@@ -146,11 +145,17 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     section = _robot_section(asked, file)
     bare = _build_bare(section, file)
     loaded, density = bare.assembly.loaded[0], asked.density
-    shaped = None if asked.base is not None else _base(bare.assembly.model)
+    model, shaped = loaded.model, None
+    if asked.base is None:
+        # A single body floats, with rotors or wheels too; a single limb is an arm.
+        if not model.nv or (not floats(model) and only_turns(model)):
+            shaped = "floating"
+        elif floats(model) and sum(int(parent) == 1 for parent in model.parents) == 1:
+            shaped = "fixed"
     base = shaped or asked.base
     if section.name is None and density is None:
-        masses = loaded.model, loaded.description
-        if lacks_moments(masses[1]) or lacks_masses(*masses, floating=base == "floating"):
+        known, free = loaded.description, base == "floating"
+        if lacks_moments(known) or lacks_masses(model, known, floating=free):
             density = _DENSITY
     if (base, density) != (section.base, section.density):
         section = section.model_copy(update={"base": base, "density": density})
@@ -237,17 +242,6 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
         density=asked.density,
         mimic=asked.mimic,
     )
-
-
-def _base(model: pin.Model) -> Literal["fixed", "floating"] | None:
-    """Return what the base has to be by the robot's shape; None: what its file states will do.
-
-    A single body floats, with rotors or wheels too; a single limb is an arm.
-    """
-    if not model.nv or (not floats(model) and only_turns(model)):
-        return "floating"
-    limbs = sum(int(parent) == 1 for parent in model.parents)
-    return "fixed" if floats(model) and limbs == 1 else None
 
 
 def _relative(file: Path, path: Path) -> str:

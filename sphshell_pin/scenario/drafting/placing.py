@@ -14,14 +14,14 @@ from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.poses import Limb, Stance, stances
 from sphshell_pin.scenario.drafting.touch_points import TouchPoint, touches_once
-from sphshell_pin.scenario.drafting.vectors import nearest_axis, turned_to
+from sphshell_pin.scenario.drafting.vectors import turned_to
 from sphshell_pin.scenario.drafting.wording import axis_name, mm, rounded
 
 # Turns of the part about the approach, tried in this order [rad].
 _YAWS = tuple(np.deg2rad((0, 180, 90, -90, 45, -45, 135, -135)))
 # Cosine between the normal that is touched and the side of the part, which is turned to the tip:
 # below it the part is turned to the normal itself, or another place is looked for.
-_STEEP = 0.8
+STEEP = 0.8
 # Places and turns at which links are held against the part: of one side and height, of these once
 # so many were tried in all, and places of one posture that are offered.
 _MOST_TRIED, _FEWER, _MANY, _MOST_OF_STANCE = 160, 16, 1000, 2
@@ -104,7 +104,7 @@ class Bench:
             self.postures += 1
             offered = 0
             for spot, z in zip(spots, heights, strict=True):
-                faces, tip = spot.normal @ side > _STEEP, self._limb.tip
+                faces, tip = spot.normal @ side > STEEP, self._limb.tip
                 on_face = faces and touches_once(
                     shell, spot, spot.point[None], tip.radius, self._depth
                 )
@@ -177,9 +177,3 @@ class Bench:
 def nearer(placement: pin.SE3, way: Array) -> pin.SE3:
     """Return the placement of a part that stands nearer to a tip, moved against the `way` (3,)."""
     return pin.SE3(placement.rotation, placement.translation - way)
-
-
-def nearest_side(normal: Array) -> Array:
-    """Return the axis (3,) nearest to `normal` (3,), or the normal itself if that is oblique."""
-    axis = nearest_axis(normal)
-    return axis if axis @ normal > _STEEP else normal

@@ -14,7 +14,7 @@ from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.fingertips import other_ends
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
-from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
+from sphshell_pin.scenario.drafting.placing import STEEP, Bench, Place
 from sphshell_pin.scenario.drafting.plan import TIP_GAP, Plan, Press, press_force, press_gap
 from sphshell_pin.scenario.drafting.poses import Limb, approaches
 from sphshell_pin.scenario.drafting.searching import CannotReach, Search
@@ -26,6 +26,7 @@ from sphshell_pin.scenario.drafting.touch_points import (
     touch_points,
 )
 from sphshell_pin.scenario.drafting.trial import Fault
+from sphshell_pin.scenario.drafting.vectors import nearest_axis
 from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
 
@@ -153,7 +154,8 @@ class PressSearch(Search):
         gap, choices = TIP_GAP * radius, list[tuple[Array, list[TouchPoint]]]()
         if asked.at is not None or isinstance(asked.path, np.ndarray):
             spots = asked_touches(asked, shell, radius, gap)
-            choices.append((nearest_side(spots[0].normal), spots))
+            axis, normal = nearest_axis(spots[0].normal), spots[0].normal
+            choices.append((axis if axis @ normal > STEEP else normal, spots))
         else:
             word = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
             for side in sides(shell) if word is None else [word]:
