@@ -166,9 +166,10 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
 def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> Sequence[Tip]:
     """Return the `tips`, balls of free size that press on a file's surface as it needs them.
 
-    A round end that is larger than the surface gets a smaller ball on it.
+    A round end that is larger than the surface gets a smaller ball on it, but of a shipped robot.
     """
     (made,), floating = built.shells.values(), floats(built.assembly.model)
+    shipped = built.scenario.robot[0].name is not None
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
     stated = asked.radius is not None or asked.tip is not None or asked.tips == "all"
     if asked.word is not None or stated:
@@ -179,7 +180,7 @@ def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> Sequence[Tip]:
 
     def sized(tip: Tip) -> Tip:
         large = tip.radius > made.size
-        if large and tip.ahead is None and asked.offset is None:
+        if large and tip.ahead is None and asked.offset is None and not shipped:
             return LinkGeometry(built.assembly.loaded[0], tip.frame).end(most)
         return tip.at_most(most) if large or not floating else tip
 

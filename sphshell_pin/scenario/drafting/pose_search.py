@@ -172,11 +172,14 @@ class PressSearch(Search):
     def refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""
         place, bench, frame = self.asked.place, self.bench, self.tip.frame
+        ends = other_ends(self.model, frame)
         if not bench.postures:
             way = f"along {place}" if place else "along any axis"
-            return SphshellError(
-                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried: its "
-                "joints do not allow it; take another --place or --frame"
+            return CannotReach(
+                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried; its "
+                "joints do not allow it: take another --place or --frame",
+                frame,
+                ends,
             )
         ((link, _),) = bench.blocked.most_common(1) or [("", 0)]
         if self.faults:
@@ -195,4 +198,4 @@ class PressSearch(Search):
             said = "the surface has no point to touch"
         if not link:
             return SphshellError(said)
-        return CannotReach(said, frame, other_ends(self.model, frame), bench.out_of_limb())
+        return CannotReach(said, frame, ends, bench.out_of_limb())

@@ -55,7 +55,7 @@ class CannotStand(SphshellError):
 
 
 class CannotReach(SphshellError):
-    """The links of a limb would be in the part wherever its tip, on `frame`, touches that.
+    """The tip of a limb, on `frame`, cannot press, or links would be in the part wherever it does.
 
     `others` are frames at the ends of other limbs, `out` is a tip farther out of the limb.
     """
