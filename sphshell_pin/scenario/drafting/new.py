@@ -297,7 +297,8 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
     if asked.tips == "one":
         centers = sphere_centers(built.assembly.model, built.assembly.q0, tips)
         spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
-        half = rounded(1.05 * max(_SIZE * largest, spread))
+        least = max(_SIZE * largest, spread)
+        half = rounded(least) if rounded(least) >= least else rounded(1.05 * least)
         length = (0.4 if word == "box" else 2.0) * half
     primitives: dict[str, Primitive] = {
         "plane": HalfSpace(2 * half),
