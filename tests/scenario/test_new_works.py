@@ -22,9 +22,8 @@ from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.paths import Way
-from sphshell_pin.scenario.drafting.plan import Press
+from sphshell_pin.scenario.drafting.plan import Materials, Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
-from sphshell_pin.scenario.drafting.tip_contact import Materials
 from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf

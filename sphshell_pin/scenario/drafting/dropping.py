@@ -12,10 +12,10 @@ from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import joints_without_mass
 from sphshell_pin.scenario.drafting.limb_ends import joint_of, sphere_centers
-from sphshell_pin.scenario.drafting.plan import Hold, Plan
+from sphshell_pin.scenario.drafting.part import GRAVITY
+from sphshell_pin.scenario.drafting.plan import Contact, Hold, Plan, chosen_materials
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.searching import CannotStand, Search
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Contact, chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import come_down, find_touch_point
 from sphshell_pin.scenario.drafting.wording import mm, rounded
 from sphshell_pin.shell import Shell

@@ -81,13 +81,12 @@ def find_tips(
             bottoms = sphere_centers(model, robot.q0, known)[:, 2] - [one.radius for one in known]
             low = bottoms <= bottoms.min() + _AS_LOW * model_reach(model)
             known = [known[k] for k in np.flatnonzero(low)]
-    for k, one in enumerate(known):
-        if radius is None:
-            break
-        # A center that stands one radius before the frame goes on touching it.
-        touching = one.radius and abs(np.linalg.norm(one.offset) - one.radius) < 1e-9
-        at = one.offset * (radius / one.radius) if touching else one.offset
-        known[k] = Tip(one.frame, radius, at, one.source)
+    if radius is not None:
+        for k, one in enumerate(known):
+            # A center that stands one radius before the frame goes on touching it.
+            touching = one.radius and abs(np.linalg.norm(one.offset) - one.radius) < 1e-9
+            at = one.offset * (radius / one.radius) if touching else one.offset
+            known[k] = Tip(one.frame, radius, at, one.source)
     # The sphere of a shipped robot is where it belongs, whatever size is asked for.
     for one in known if shipped is None or offset is not None else ():
         _check_outside(robot, one)

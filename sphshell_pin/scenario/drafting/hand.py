@@ -17,11 +17,10 @@ from sphshell_pin.scenario.drafting.fingertips import every_finger
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.part import Part
-from sphshell_pin.scenario.drafting.plan import Hold, Plan
+from sphshell_pin.scenario.drafting.part import GRAVITY, Part
+from sphshell_pin.scenario.drafting.plan import Hold, Materials, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
 from sphshell_pin.scenario.drafting.searching import Search, coordinates
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Materials
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 

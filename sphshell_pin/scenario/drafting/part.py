@@ -13,10 +13,11 @@ from sphshell_pin.contact.materials import Material
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.robots.inertia import inertia_of_solid, inertial_element
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.shell.shell import Shell
+
+GRAVITY = 9.81
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,16 @@ from sphshell_pin.scenario.drafting.fingertips import other_ends
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
 from sphshell_pin.scenario.drafting.placing import STEEP, Bench, Place
-from sphshell_pin.scenario.drafting.plan import TIP_GAP, Plan, Press, press_force, press_gap
+from sphshell_pin.scenario.drafting.plan import (
+    TIP_GAP,
+    Plan,
+    Press,
+    chosen_materials,
+    press_force,
+    press_gap,
+)
 from sphshell_pin.scenario.drafting.poses import Limb, approaches
 from sphshell_pin.scenario.drafting.searching import CannotReach, Search
-from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
 from sphshell_pin.scenario.drafting.touch_points import (
     TouchPoint,
     asked_touches,

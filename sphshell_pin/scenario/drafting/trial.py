@@ -11,8 +11,8 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD
+from sphshell_pin.scenario.drafting.part import GRAVITY
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.drafting.vectors import unit
 from sphshell_pin.scenario.format.bodies import joint_spans, to_se3
 from sphshell_pin.scenario.format.build import Built
