@@ -204,3 +204,16 @@ def test_a_ball_between_walls_is_carried_out_of_them(draft, tmp_path: Path) -> N
     assert log.normal_force[log.t > log.t.max() - 0.2].mean() == pytest.approx(force, rel=0.05)
     with pytest.raises(CannotReach, match="'cup' would be in the part"):
         draft(file, frame="tip", radius=0.01)
+
+
+def test_what_stands_beside_a_free_body_is_not_carried_by_it(draft, tmp_path: Path) -> None:
+    file = tmp_path / "scene.xml"
+    geom = '<geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/>'
+    file.write_text(
+        '<mujoco><worldbody><body name="object" pos="1 0 0"><freejoint/><geom size=".05"/></body>'
+        f'<body name="upper"><joint name="a" axis="0 1 0"/>{geom}<body name="lower" pos="0 0 .3">'
+        f'<joint name="b" axis="0 1 0"/>{geom}</body></body></worldbody></mujoco>'
+    )
+    made = draft(file, "plane")
+    assert made.built.scenario.robot[0].base == "fixed"
+    assert settled(made) == pytest.approx(1.0, abs=0.05)

@@ -147,10 +147,12 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     loaded, density = bare.assembly.loaded[0], asked.density
     model, shaped = loaded.model, None
     if asked.base is None:
-        # A single body floats, with rotors or wheels too; a single limb is an arm.
+        # A single body floats, with rotors or wheels too; a single limb is an arm, and what stands
+        # beside a free body is not carried by it.
+        roots, limbs = (list(model.parents)[1:].count(joint) for joint in (0, 1))
         if not model.nv or (not floats(model) and only_turns(model)):
             shaped = "floating"
-        elif floats(model) and sum(int(parent) == 1 for parent in model.parents) == 1:
+        elif floats(model) and (limbs == 1 or roots > 1):
             shaped = "fixed"
     base = shaped or asked.base
     if section.name is None and density is None:
@@ -272,7 +274,7 @@ def _build_bare(
 
 def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) -> ShellSection:
     """Return the surface's table."""
-    file, word, parts = Path(asked.surface), asked.word, (asked.bodies, asked.faces)
+    file, word = Path(asked.surface), asked.word
     if word is None:
         return ShellSection(
             name=file.stem.replace(".", "-"),
@@ -285,10 +287,9 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         if file.suffix:
             raise SphshellError(f"surface {file}: {why_no_file(file)}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
-    if asked.unit is not None:
-        raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
-    if parts != (None, None):
-        raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
+    if (asked.unit, asked.bodies, asked.faces) != (None, None, None):
+        said = f"not to the {word}, which is sized in meters"
+        raise SphshellError(f"a unit, bodies and faces belong to a surface file, {said}")
     if asked.tips == "all" and word not in HELD_WORDS:
         said = f"a hand cannot hold a {word}: --tips all takes {', '.join(HELD_WORDS)}"
         raise SphshellError(said)
