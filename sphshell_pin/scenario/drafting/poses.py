@@ -63,8 +63,9 @@ class Limb(Reach):
         self.on_line = max(_rank(one) for one in moves) == 1
         """Whether all joints move the tip along one line, in any posture."""
         every = np.hstack(moves)
-        self.ways = np.linalg.svd(every)[0][:, : 3 if self.on_line else _rank(every)]
-        """Orthonormal (3, k): along them the tip moves, in some posture at least."""
+        ways = np.linalg.svd(every)[0][:, : 3 if self.on_line else _rank(every)]
+        self.onto_ways = ways @ ways.T
+        """Projects (3,) on where the tip moves, in some posture at least."""
 
     def direction(self) -> Array:
         """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
@@ -75,13 +76,15 @@ class Limb(Reach):
         pose = self.data.oMf[self.frame]
         # A small ball on a flat end may be far beside the frame.
         way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
-        away = [pose.translation - self.data.oMi[j].translation for j in reversed(self.chain)]
         # A wheel's place on its axle is not where its leg points.
-        flat = [self.ways @ (self.ways.T @ one) for one in (pose.rotation @ way, *away)]
-        if np.linalg.norm(flat[0]) > _BESIDE * np.linalg.norm(way):
-            return unit(flat[0])
-        beyond = (one for one in flat[1:] if np.linalg.norm(one) > self.tip.radius)
-        return unit(next(beyond, np.array([0.0, 0.0, -1.0])))
+        ahead = self.onto_ways @ pose.rotation @ way
+        if np.linalg.norm(ahead) > _BESIDE * np.linalg.norm(way):
+            return unit(ahead)
+        for joint in reversed(self.chain):
+            away = self.onto_ways @ (pose.translation - self.data.oMi[joint].translation)
+            if np.linalg.norm(away) > self.tip.radius:
+                return unit(away)
+        return np.array([0.0, 0.0, -1.0])
 
     def pushes(self, approach: Array) -> list[Array]:
         """Return where the tip presses near an `approach` (3,), in the posture asked for last.
