@@ -63,8 +63,9 @@ class Limb(Reach):
         self.on_line = max(_rank(one) for one in moves) == 1
         """Whether all joints move the tip along one line, in any posture."""
         every = np.hstack(moves)
-        ways = np.linalg.svd(every)[0][:, : 3 if self.on_line else _rank(every)]
-        self.onto_ways = ways @ ways.T
+        ways = np.linalg.svd(every)[0][:, :2]
+        in_plane = not self.on_line and _rank(every) == 2
+        self.onto_ways = ways @ ways.T if in_plane else np.eye(3)
         """Projects (3,) on where the tip moves, in some posture at least."""
 
     def direction(self) -> Array:
