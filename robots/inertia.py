@@ -61,7 +61,7 @@ def with_density(description: Description, density: float) -> tuple[Description,
                 continue
             for stated in link.findall("inertial"):
                 link.remove(stated)
-            link.insert(0, _element(inertia))
+            link.insert(0, inertial_element(inertia))
     said = "are those of their geometry"
     notes = [
         f"the masses of {_list(list(added))} {said} at {density:g} kg/m^3, "
@@ -180,11 +180,11 @@ def _inertia(
     for part in geometry.geometryObjects:
         if part.parentFrame == frame:
             place = model.frames[frame].placement.actInv(part.placement)
-            total += place.act(_of_solid(Shell.from_geometry(part), density))
+            total += place.act(inertia_of_solid(Shell.from_geometry(part), density))
     return total
 
 
-def _of_solid(shell: Shell, density: float) -> pin.Inertia:
+def inertia_of_solid(shell: Shell, density: float) -> pin.Inertia:
     """Return the inertia of what a shell encloses, or of its convex hull where it is open."""
     with interrupts_delayed():
         import trimesh
@@ -203,7 +203,8 @@ def _of_solid(shell: Shell, density: float) -> pin.Inertia:
     return pin.Inertia(float(solid.mass), middle + solid.center_mass, solid.moment_inertia)
 
 
-def _element(inertia: pin.Inertia) -> ET.Element:
+def inertial_element(inertia: pin.Inertia) -> ET.Element:
+    """Return what a link of a URDF states."""
     out = ET.Element("inertial")
     ET.SubElement(out, "origin", xyz=" ".join(f"{x:.9g}" for x in inertia.lever), rpy="0 0 0")
     ET.SubElement(out, "mass", value=f"{inertia.mass:.9g}")

@@ -12,7 +12,7 @@ from benchmarks.peers.scenes import Scene
 from benchmarks.peers.shapes import Surface
 from benchmarks.peers.truths import BallScene, Bowl
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.queries import coal_tree
+from sphshell_pin.shell.primitives import coal_tree
 from sphshell_pin.study.report.steps import bare
 
 MOST = 1000  # contacts asked for

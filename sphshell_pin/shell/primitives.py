@@ -8,9 +8,11 @@ loads a mesh, and it is meant for viewers of the file.
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import coal
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.base.arrays import Array, Longs, frame_along
 from sphshell_pin.errors import InvalidParameter
@@ -181,6 +183,16 @@ def geometry_surface(
             return build(shape, chord_error, segments)
     known = ["mesh (BVHModel)", "Convex", "Halfspace", "Plane", *(k.__name__ for k in _BUILDERS)]
     raise InvalidParameter("geometry", type(shape).__name__, f"must be one of: {', '.join(known)}")
+
+
+def coal_tree(vertices: Array, triangles: NDArray[np.integer[Any]]) -> coal.BVHModelOBBRSS:
+    """Return Coal's tree of a mesh."""
+    tree = coal.BVHModelOBBRSS()
+    tree.beginModel(len(triangles), len(vertices))
+    tree.addVertices(vertices)
+    tree.addTriangles(triangles.astype(np.uint32))
+    tree.endModel()
+    return tree
 
 
 def _mesh(mesh: coal.BVHModelBase) -> RawSurface:

@@ -180,7 +180,12 @@ def test_the_ball_comes_back_as_high_as_its_material_says(draft):
             SphshellError,
             r"less than the sphere's radius .* --radius [0-9.]+mm$",
         ),
-        (("gear_pair",), {}, SphshellError, "gear_1. cannot move along any axis"),
+        (
+            ("gear_pair",),
+            {"frame": "gear_1", "radius": 0.01},
+            SphshellError,
+            "gear_1. cannot move along any axis",
+        ),
         pytest.param(
             ("three_link_finger",),
             {"press": 1e4},

@@ -22,9 +22,8 @@ from sphshell_pin.scenario.drafting.fingertips import find_tips
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.paths import Way
-from sphshell_pin.scenario.drafting.plan import Press
+from sphshell_pin.scenario.drafting.plan import Materials, Press
 from sphshell_pin.scenario.drafting.pose_search import repaired
-from sphshell_pin.scenario.drafting.tip_contact import Materials
 from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_fault
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf
@@ -152,12 +151,19 @@ def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
     assert build(made.path).scene.model.nv <= 4
 
 
-@pytest.mark.parametrize("geometry", ['<sphere radius="0.06"/>', '<box size="0.2 0.2 0.2"/>'])
+@pytest.mark.parametrize(
+    ("kind", "geometry"),
+    [
+        ("visual", '<sphere radius="0.06"/>'),
+        ("collision", '<sphere radius="0.06"/>'),
+        ("visual", '<box size="0.2 0.2 0.2"/>'),
+    ],
+)
 @pytest.mark.parametrize("floats", [False, True])
-def test_an_end_larger_than_the_part_gets_a_smaller_ball(geometry, floats, tmp_path):
+def test_an_end_larger_than_the_part_gets_a_smaller_ball(kind, geometry, floats, tmp_path):
     """Round ones too, and that of a body that falls."""
     mass = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
-    visual = f"<visual><geometry>{geometry}</geometry></visual>"
+    visual = f"<{kind}><geometry>{geometry}</geometry></{kind}>"
     link = f'<link name="b">{mass}</inertial>{visual}</link>'
     joint = '<link name="a"/><joint name="j" type="prismatic"><parent link="a"/><child link="b"/>'
     joint += '<axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="99" velocity="9"/></joint>'
@@ -370,3 +376,11 @@ def test_a_tip_may_stay_behind_the_end_of_its_path_by_a_part_of_its_radius(aside
     fault = _path_fault(SimpleNamespace(scene=scene), plan, result)
     assert (fault is not None) == told
     assert not told or "33 mm behind the end of its path" in fault.text
+
+
+def test_a_force_that_comes_late_gets_more_time_once():
+    press = pressing(PATH[:1], repair="stays")
+    late = Fault("force", "it is low", 0.6 * press.lead_in)
+    slower = repaired(press, late)
+    assert slower.force_rise == pytest.approx(2 * press.force_rise)
+    assert repaired(slower, late) is None

@@ -10,8 +10,7 @@ import pytest
 
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.plan import press_force
-from sphshell_pin.scenario.drafting.tip_contact import Materials
+from sphshell_pin.scenario.drafting.plan import Materials, press_force
 from sphshell_pin.scenario.running.run import simulate
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"

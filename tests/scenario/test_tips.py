@@ -1,6 +1,7 @@
 """Which frame carries the sphere of a new scenario: tools before jaws; fingers without spheres."""
 
 import itertools
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -329,13 +330,13 @@ def test_where_only_edges_were_touched_the_links_were_in_the_way(load, even: boo
     (tip,) = tips_of(robot)
     search = SimpleNamespace(
         asked=SimpleNamespace(place=None),
-        bench=SimpleNamespace(postures=1, blocked={"link": 1}, out_of_limb=lambda: tip),
+        bench=SimpleNamespace(postures=1, blocked=Counter(link=1), out_of_limb=lambda: tip),
         model=robot.model,
         tip=tip,
         faults=[Fault("force", "the force of 5 N is not held")],
         even=even,
         failed=lambda: "no draft works",
     )
-    error = PressSearch._refusal(search)
+    error = PressSearch.refusal(search)
     assert isinstance(error, CannotReach) != even
     assert "no draft works; take a smaller --radius" in str(error)

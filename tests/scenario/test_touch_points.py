@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.scenario.drafting.dropping import placed_under
+from sphshell_pin.scenario.drafting.dropping import way_down
 from sphshell_pin.scenario.drafting.touch_points import (
     find_touch_point,
     paths_on_surface,
+    sides,
     touch_points,
     touches_once,
 )
@@ -23,13 +24,13 @@ def test_feet_come_down_on_what_is_under_them():
     plate = shell_of(coal.Box(0.1, 0.1, 0.02))
     feet = np.array([[x, y, 0.3] for x in (-0.4, 0.4) for y in (-0.2, 0.2)])
     radii = np.full(4, 0.02)
-    placement = placed_under(plate, feet, radii, 0.002)
-    gaps = np.abs(plate.closest_points(feet - placement.translation).distances) - radii
+    way = way_down(plate, feet, radii, 0.002)
+    gaps = np.abs(plate.closest_points(feet + way).distances) - radii
     assert gaps.min() == pytest.approx(0.002, rel=2e-3)
     # Over a plate that is large enough all of them have it.
     large = shell_of(coal.Box(2.0, 2.0, 0.02))
-    placement = placed_under(large, feet, radii, 0.002)
-    gaps = np.abs(large.closest_points(feet - placement.translation).distances) - radii
+    way = way_down(large, feet, radii, 0.002)
+    gaps = np.abs(large.closest_points(feet + way).distances) - radii
     np.testing.assert_allclose(gaps, 0.002, rtol=2e-3)
 
 
@@ -67,7 +68,9 @@ def test_a_spot_avoids_edges_and_grooves():
 def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
     geometry, toward, inside, point, normal
 ):
-    spot = find_touch_point(shell_of(geometry), 0.01, 1e-3, toward=toward, inside=inside)
+    shell = shell_of(geometry)
+    toward = sides(shell)[0] if toward is None else np.array(toward, float)
+    spot = find_touch_point(shell, 0.01, 1e-3, toward=toward, inside=inside)
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
     np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
     np.testing.assert_allclose(spot.center, spot.point + 0.011 * spot.normal, atol=2e-6)
@@ -94,7 +97,7 @@ def test_a_way_across_stays_on_the_surface_and_ends_at_the_rim():
     np.testing.assert_allclose(np.linalg.norm(way, axis=1), 0.1, atol=2e-4)
     assert way[-1, 0] > 0.05
     box = shell_of(coal.Box(0.2, 0.2, 0.04))
-    spot = find_touch_point(box, 0.01, 1e-3)
+    spot = find_touch_point(box, 0.01, 1e-3, toward=sides(box)[0])
     way = next(paths_on_surface(box, spot, np.array([1.0, 0.0, 0.0]), 1.0, 0.005))
     assert np.abs(way[:, :2]).max() <= 0.1 + 1e-9
     np.testing.assert_allclose(way[:, 2], 0.02, atol=1e-9)

@@ -14,6 +14,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_points, check_positive, check_vector
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import InvalidParameter, NameNotFound
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 
 PLACES: dict[str, tuple[float, float, float]] = {
     "below": (0.0, 0.0, -1.0),
@@ -46,7 +47,8 @@ class Asked:
         A surface file, its `unit` where the format has none, or a word of WORDS.
     frame, radius, offset
         Of the sphere: the frame that carries it, its radius [m], and its center (3,) [m] in the
-        frame, by default the origin; without a frame it is a known fingertip or foot.
+        frame, by default the origin; without a frame it is a known fingertip or foot. A `tip`
+        stands for all three.
     bodies, faces
         Of a CAD file: those to take, by name or number; by default all of it.
     material, against
@@ -87,6 +89,7 @@ class Asked:
     frame: str | None = None
     radius: float | None = None
     offset: Array | None = None
+    tip: Tip | None = None
     unit: str | None = None
     bodies: Sequence[str] | None = None
     faces: Sequence[str | int] | None = None
@@ -152,17 +155,7 @@ class Asked:
     @property
     def slides(self) -> bool:
         """Whether a path is asked for."""
-        return isinstance(self.path, str) or (self.path is not None and len(self.path) > 1)
-
-    @property
-    def whole(self) -> bool:
-        """Whether part of the path will not do."""
-        return isinstance(self.path, np.ndarray) or self.path in SHAPES[1:]
-
-    @property
-    def fixed(self) -> bool:
-        """Whether the place is asked for."""
-        return self.at is not None or isinstance(self.path, np.ndarray)
+        return self.path is not None and len(self.path) > 1
 
 
 def _numbers(text: str) -> Array | None:

@@ -11,6 +11,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.models import find_frame, held_joints
 from sphshell_pin.scenario.drafting.limb_ends import AT_TIP, Tip
+from sphshell_pin.shell.primitives import coal_tree
 from sphshell_pin.shell.shell import Shell
 
 # Contacts of the tip's own link that are looked at.
@@ -45,26 +46,32 @@ class Links:
         for one in self._geometry.geometryObjects:
             one.geometry.computeLocalAABB()
         if q is not None:
-            self.crossed(q, all_pairs=True)
+            self.crossed(q, stop=False)
         for k, result in enumerate(self._geometry_data.collisionResults):
             if result.isCollision():
                 self._geometry_data.deactivateCollisionPair(k)
         self.shell, self._tips = shell, tuple(tips)
-        self._surface = _tree(shell)
+        triangles = shell.triangles
+        if shell.side == "inside":
+            # Of a hollow links may not touch the lower half, as a bowl's.
+            heights = shell.vertices[triangles, 2].max(axis=1)
+            triangles = triangles[heights <= shell.box[:, 2].mean() + 1e-9 * shell.size]
+        self._surface = coal_tree(shell.vertices, triangles)
         frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
         held = set(held_joints(model, tuple(lock)))
-        self._objects: list[tuple[int, tuple[int, ...]]] = []
+        movers = [set(map(int, chain)) - held for chain in model.supports]
+        self._objects: list[tuple[int, list[int]]] = []
         for i, one in enumerate(geometry.geometryObjects):
             # It does not move against the tips at these places.
-            mover = _mover(model, one.parentJoint, held)
-            at = [k for k, f in enumerate(frames) if _mover(model, f.parentJoint, held) == mover]
-            if not any(_is_sphere(one, model, frames[k], tips[k]) for k in at):
-                self._objects.append((i, tuple(at)))
+            same = movers[one.parentJoint]
+            at = [k for k, frame in enumerate(frames) if movers[frame.parentJoint] == same]
+            if not any(_is_sphere(one, frames[k], tips[k]) for k in at):
+                self._objects.append((i, at))
 
-    def crossed(self, q: Array, *, all_pairs: bool = False) -> bool:
-        """Whether links touch each other at q (nq,) that may not."""
+    def crossed(self, q: Array, *, stop: bool = True) -> bool:
+        """Whether links touch each other at q (nq,) that may not; `stop` at the first ones."""
         geometry = self._geometry, self._geometry_data
-        return bool(pin.computeCollisions(self.model, self._data, *geometry, q, not all_pairs))
+        return bool(pin.computeCollisions(self.model, self._data, *geometry, q, stop))
 
     @cached_property
     def floor(self) -> float:
@@ -93,84 +100,48 @@ class Links:
 
         With `whole` a link that is inside as a whole, and touches nothing, counts too.
         """
-        model, geometry = self.model, self._geometry
         self._place(q)
-        pin.updateFramePlacements(model, self._data)
-        centers = [
-            self._data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in self._tips
-        ]
-        part = coal.Transform3s(placement.rotation, placement.translation)
+        pin.updateFramePlacements(self.model, self._data)
+        frames = (self._data.oMf[find_frame(self.model, tip.frame)] for tip in self._tips)
+        tips = zip(frames, self._tips, strict=True)
+        balls = [(placement.actInv(frame.act(tip.offset)), tip) for frame, tip in tips]
         for k, (i, at) in enumerate(self._objects):
-            one, pose = geometry.geometryObjects[i], self._geometry_data.oMg[i]
-            spheres = [(centers[k], self._tips[k].radius) for k in at]
-            if self._touches(one, pose, part, spheres) or (
-                whole and self._inside(one, pose, placement)
+            one = self._geometry.geometryObjects[i]
+            pose = placement.actInv(self._geometry_data.oMg[i])
+            if self._touches(one, pose, [balls[k] for k in at]) or (
+                whole and self._inside(one, pose)
             ):
                 # What is in the way here will be so in the next place, too.
                 self._objects.insert(0, self._objects.pop(k))
-                return _link_of(model, one)
+                name = str(self.model.frames[one.parentFrame].name)
+                return name if name != "universe" else str(one.name)
         return None
 
     def _touches(
-        self,
-        one: pin.GeometryObject,
-        pose: pin.SE3,
-        part: coal.Transform3s,
-        spheres: Sequence[tuple[Array, float]],
+        self, one: pin.GeometryObject, pose: pin.SE3, balls: Sequence[tuple[Array, Tip]]
     ) -> bool:
-        """Whether a geometry touches the surface beside the spheres."""
-        place = coal.Transform3s(pose.rotation, pose.translation)
-        most = _MOST_CONTACTS if spheres else 1
-        request, result = (
-            coal.CollisionRequest(coal.CollisionRequestFlag.CONTACT, most),
-            coal.CollisionResult(),
-        )
-        coal.collide(one.geometry, place, self._surface, part, request, result)
+        """Whether a geometry touches the surface, in whose frame all is, beside the tips."""
+        link, part = coal.Transform3s(pose.rotation, pose.translation), coal.Transform3s()
+        flag, most = coal.CollisionRequestFlag.CONTACT, _MOST_CONTACTS if balls else 1
+        request, result = coal.CollisionRequest(flag, most), coal.CollisionResult()
+        coal.collide(one.geometry, link, self._surface, part, request, result)
         return any(
-            all(np.linalg.norm(contact.pos - c) > AT_TIP * radius for c, radius in spheres)
-            for contact in result.getContacts()
+            all(np.linalg.norm(at.pos - center) > AT_TIP * tip.radius for center, tip in balls)
+            for at in result.getContacts()
         )
 
-    def _inside(self, one: pin.GeometryObject, pose: pin.SE3, placement: pin.SE3) -> bool:
+    def _inside(self, one: pin.GeometryObject, pose: pin.SE3) -> bool:
         """Whether a point of a geometry is behind the surface, where that is closed."""
         if not self.shell.is_closed or self.shell.side == "inside":
             return False
         mesh = isinstance(one.geometry, coal.BVHModelBase)
-        point = np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3)
-        at = placement.actInv(pose.act(point))
+        at = pose.act(np.array(one.geometry.vertices()[0]) if mesh else np.zeros(3))
         if (at < self.shell.box[0]).any() or (at > self.shell.box[1]).any():
             return False
         return bool(self.shell.closest_points(at[None], method="facets").distances[0] < 0)
 
 
-def _tree(shell: Shell) -> coal.BVHModelOBBRSS:
-    """Return the triangles that links may not touch: of a hollow its lower half, as a bowl's."""
-    triangles = shell.triangles
-    if shell.side == "inside":
-        heights = shell.vertices[triangles][..., 2].max(axis=1)
-        triangles = triangles[heights <= shell.box[:, 2].mean() + 1e-9 * shell.size]
-    tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(triangles), len(shell.vertices))
-    tree.addVertices(shell.vertices)
-    tree.addTriangles(triangles.astype(np.uint32))
-    tree.endModel()
-    return tree
-
-
-def _mover(model: pin.Model, joint: int, held: set[int]) -> int:
-    """Return the joint that moves the links of `joint`; `held` ones are locked."""
-    while joint in held:
-        joint = int(model.parents[joint])
-    return int(joint)
-
-
-def _is_sphere(one: pin.GeometryObject, model: pin.Model, frame: pin.Frame, tip: Tip) -> bool:
-    if not isinstance(one.geometry, coal.Sphere) or one.parentJoint != frame.parentJoint:
-        return False
+def _is_sphere(one: pin.GeometryObject, frame: pin.Frame, tip: Tip) -> bool:
     away = one.placement.translation - frame.placement.act(tip.offset)
-    return bool(np.linalg.norm(away) < 1e-3 * tip.radius)
-
-
-def _link_of(model: pin.Model, one: pin.GeometryObject) -> str:
-    name = str(model.frames[one.parentFrame].name)
-    return name if name != "universe" else str(one.name)
+    near = np.linalg.norm(away) < 1e-3 * tip.radius and one.parentJoint == frame.parentJoint
+    return bool(near and isinstance(one.geometry, coal.Sphere))

@@ -28,87 +28,63 @@ _SIDES = {
 # Column of the comments beside values.
 _COLUMN = 34
 
-# A line whose value is marked !o (optional) and is nothing, or zero, is left out, with the comment
-# line above it.
+# Sections by the name of the value that they need. A line whose value is marked !o (optional) and
+# is nothing, or zero, is left out, with the comment line above it.
 _PARTS = re.split(
     r"^==== (.*)\n", Path(__file__).with_name("draft.template").read_text("utf-8"), flags=re.M
 )
-_TEMPLATES = dict(zip(_PARTS[1::2], _PARTS[2::2], strict=True))
+_SECTIONS = tuple(zip(_PARTS[1::2], _PARTS[2::2], strict=True))
 
 
 def draft_text(name: str, title: str, robot: RobotSection, shell: ShellSection, plan: Plan) -> str:
     """Return the text of the scenario called `name`."""
     digits, part, contact, tips = decimals(plan.gap), plan.part, plan.contact, plan.tips
-    text = _fill(
-        "robot", name=name, title=title, robot=robot, table="[[robot]]" if part else "[robot]"
-    )
-    if not robot.mimic:
-        text += "mimic = false # joints that mimic others move freely\n"
-    root = None if plan.root is None else _rounded(plan.root, 9 if part else digits)
-    if robot.start:
-        text += _fill("posture") + _table(robot.start)
-    if part:
-        text += _fill("part", body=part, material=contact.against, urdf=part_file(name), root=root)
-    elif root:
-        text += _fill("root", root=root)
-    sides = {"side": _SIDES[shell.side], "frame": "part/part" if part else shell.frame}
-    text += _fill("shell", shell=shell, primitive=shell.model_dump()["primitive"], **sides)
-    if plan.root is None:
-        angles = np.rad2deg(pin.rpy.matrixToRpy(plan.placement.rotation))
-        angles[np.abs(angles) < 1e-6] = 0.0
-        xyz, rpy = _rounded(plan.placement.translation, digits), _rounded(angles, digits)
-        text += _fill("placement", gap=1e3 * plan.gap, xyz=xyz, rpy_deg=rpy)
+    press = plan.control if isinstance(plan.control, Press) else None
+    hold = plan.control if isinstance(plan.control, Hold) else None
     label = f"{robot.label}/" if robot.label else ""
     group = f"tip{'s' if len(tips) > 1 else ''}-{shell.name}"
-    text += _contact_text(group, shell, plan, label, digits)
-    brakes = bool({"damping", "friction"} & set(robot.joints))
-    pair = _pair_name(group, tips, label, plan.strongest)
-    control, mean_force = plan.control, None
-    if isinstance(control, Press):
-        path = _rounded(control.path, digits)
-        offset = _rounded(plan.tips[0].offset, digits)
-        moves = "follows a path on the surface and presses on it"
-        told = f"The tip {moves if control.slides else 'presses on one place of the surface'}."
-        values = {"offset": offset, "path": path, "told": told, "brakes": brakes}
-        text += _fill("press", tip=tips[0], shell=shell, press=control, **values)
-        if control.way.even:
-            # Over the time of contact; while the force comes on, half of it on average.
-            full = plan.duration - 0.5 * control.force_rise
-            mean = control.force * full / (plan.duration - control.first_touch)
-            mean_force = {"value": rounded(mean, 3), "rtol": HELD}
-    elif isinstance(control, Hold):
-        text += _fill("hold", hold=control, brakes=brakes and part is not None)
-        if part:
-            text += _fill("drawn") + _table(control.drawn)
-            mean_force = {"value": rounded(control.force, 3), "rtol": HELD_IN_HAND}
-    # Measured on balls, arms, hands and legs: the implicit integrator is never much slower than
-    # others, and ten times faster than fixed steps that resolve the contact.
-    record_dt, slow = (1e-3, 0.5) if control is None else (5e-3, None)
-    text += _fill("run", plan=plan, record_dt=record_dt, slow=slow)
-    text += _fill("knobs", group=group, contact=contact)
-    keys = [] if control is None else ["kp", "kd"]
-    if isinstance(control, Press):
-        keys = ["normal_force", *(["speed"] if control.slides else []), "stiffness", "damping"]
-    else:
-        text += _fill("knob of gravity")
-    text += "".join(_fill("knob", key=key) for key in keys)
-    return text + _fill("expect", pair=pair, mean_force=mean_force)
-
-
-def _contact_text(group: str, shell: ShellSection, plan: Plan, label: str, digits: int) -> str:
-    """Return the tables of the contact of all tips, whose robot has a `label`."""
-    contact, tips = plan.contact, plan.tips
+    values = {"always": True, "name": name, "title": title, "robot": robot, "plan": plan}
+    values |= {"shell": shell, "part": part, "press": press, "hold": hold, "tips": tips}
+    values |= {"free": not robot.mimic, "start": _table(robot.start), "urdf": part_file(name)}
+    values |= {"table": "[[robot]]" if part else "[robot]", "unpressed": not press}
+    place = plan.placement or pin.SE3.Identity()
+    angles = np.rad2deg(pin.rpy.matrixToRpy(place.rotation))
+    angles[np.abs(angles) < 1e-6] = 0.0
+    values |= {"xyz": _rounded(place.translation, digits), "rpy_deg": _rounded(angles, digits)}
+    values |= {"placed": plan.placement and not part, "gap": 1e3 * plan.gap}
+    values |= {"root": _rounded(pin.SE3ToXYZQUAT(place), 9)}
+    values |= {"primitive": shell.model_dump()["primitive"], "side": _SIDES[shell.side]}
+    values |= {"frame": "part/part" if part else shell.frame}
     spheres = [
         {"frame": label + tip.frame, "radius": tip.radius}
         | ({"offset": _rounded(tip.offset, digits)} if tip.offset.any() else {})
         for tip in tips
     ]
     one, several = (spheres[0], None) if len(tips) == 1 else (None, spheres)
-    radius = min(tip.radius for tip in tips)
-    values = {"sphere": one, "spheres": several, "shell": shell, "radius": radius}
-    kind = "coulomb" if contact.bristle is None else "bristle"
-    text = _fill("contact", pair=group, plan=plan, **values)
-    return text + _fill(kind, contact=contact, torsional=plan.part is not None)
+    values |= {"sphere": one, "spheres": several, "radius": min(tip.radius for tip in tips)}
+    values |= {"contact": contact, "coulomb": not contact.bristle, "bristle": contact.bristle}
+    values |= {"group": group, "pair": _pair_name(group, tips, label, plan.strongest)}
+    brakes = bool({"damping", "friction"} & set(robot.joints))
+    values |= {"brakes": brakes, "grips": brakes and part is not None, "held": part is not None}
+    slides, mean_force = press is not None and press.slides, None
+    if press:
+        does = "follows a path on the surface and presses on it"
+        values |= {"does": does if slides else "presses on one place of the surface"}
+        values |= {"path": _rounded(press.path, digits), "offset": _rounded(tips[0].offset, digits)}
+    if press and press.way.even:
+        # Over the time of contact; while the force comes on, half of it on average.
+        full = plan.duration - 0.5 * press.force_rise
+        mean = press.force * full / (plan.duration - press.first_touch)
+        mean_force = {"value": rounded(mean, 3), "rtol": HELD}
+    elif hold and part:
+        mean_force = {"value": rounded(hold.force, 3), "rtol": HELD_IN_HAND}
+    values |= {"slides": slides, "mean_force": mean_force}
+    values |= {"drawn": _table(hold.drawn) if hold and part else ""}
+    # Measured on balls, arms, hands and legs: the implicit integrator is never much slower than
+    # others, and ten times faster than fixed steps that resolve the contact.
+    record_dt, slow = (5e-3, None) if plan.control else (1e-3, 0.5)
+    values |= {"record_dt": record_dt, "slow": slow}
+    return "".join(_fill(text, values) for needs, text in _SECTIONS if values[needs])
 
 
 def _pair_name(group: str, tips: Sequence[Tip], label: str, k: int) -> str:
@@ -125,17 +101,17 @@ def decimals(gap: float) -> int:
     return max(4, math.ceil(-math.log10(gap / 200)))
 
 
-def _fill(part: str, **values: object) -> str:
-    """Return a part of the template with `values` in place of the {names}.
+def _fill(section: str, values: Mapping[str, object]) -> str:
+    """Return a section of the template with `values` in place of the {names}.
 
     Where a value stands, it is as TOML writes it; marked !s, and elsewhere, plain text.
     """
     formatter, lines = Formatter(), list[str]()
-    for line in _TEMPLATES[part].splitlines():
+    for line in section.splitlines():
         key, equals, rest = line.partition(" = ")
         code, mark, comment = rest.partition(" # ")
         if not equals or line.startswith("#"):
-            lines.append(formatter.format(line, **values))
+            lines.append(formatter.vformat(line, (), values))
             continue
         text = ""
         for literal, name, _, conversion in formatter.parse(code):
@@ -147,12 +123,12 @@ def _fill(part: str, **values: object) -> str:
             plain = str if conversion == "s" else toml
             text += literal if name is None else literal + plain(value)
         else:
-            start = formatter.format(key, **values)
+            start = formatter.vformat(key, (), values)
             text = f"{start} = {text}"
             if isinstance(value, list) and (isinstance(value[0], list) or len(text) > 96):
                 text = f"{start} = [\n" + "".join(f"  {toml(one)},\n" for one in value) + "]"
             if mark:
-                text = f"{text.ljust(_COLUMN)} # {formatter.format(comment, **values)}"
+                text = f"{text.ljust(_COLUMN)} # {formatter.vformat(comment, (), values)}"
             lines.append(text)
             continue
         if lines and lines[-1].startswith("#"):
@@ -162,7 +138,7 @@ def _fill(part: str, **values: object) -> str:
 
 def _table(values: Mapping[str, object]) -> str:
     """Return lines of a table."""
-    return "".join(f"{_key(name)} = {toml(value)}\n" for name, value in values.items())
+    return "\n".join(f"{_key(name)} = {toml(value)}" for name, value in values.items())
 
 
 def _rounded(values: ArrayLike, digits: int) -> list[float]:

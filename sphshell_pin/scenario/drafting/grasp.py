@@ -1,7 +1,8 @@
 """How a hand holds a part: a place and joint angles at which every fingertip touches it."""
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,10 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
+from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
+from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.vectors import moved, unit
 from sphshell_pin.scenario.format.reach import Reach
@@ -58,7 +61,7 @@ class Grasp:
 
     def normal_forces(self) -> Array:
         """Return the normal force (k,) [N] of each tip."""
-        return np.asarray(-np.einsum("ki,ki->k", self.forces, self.normals))
+        return np.asarray(-(self.forces * self.normals).sum(axis=1))
 
 
 class Hand:
@@ -95,8 +98,9 @@ class Hand:
     def limbs(self) -> Array:
         """Return unit vectors (k, 3) from the last joints to the `centers` that were asked last."""
         out = []
-        for tip, reach in zip(self.tips, self.reaches, strict=True):
-            joint = reach.data.oMi[joint_of(self.model, tip.frame)].translation
+        for reach in self.reaches:
+            frame = self.model.frames[reach.frame]
+            joint = reach.data.oMi[frame.parentJoint].translation
             out.append(reach.data.oMf[reach.frame].act(reach.offset) - joint)
         return unit(np.array(out))
 
@@ -142,91 +146,71 @@ class Hand:
 
 
 def grasps(
-    hand: Hand,
-    q0: Array,
-    shell: Shell,
-    wrench: Callable[[pin.SE3], Array],
-    total: float,
-    mu: float,
-    gap: float,
-    free: Callable[..., bool],
-) -> list[Grasp]:
-    """Return grasps of the part, those that use less friction first.
+    hand: Hand, links: Links, q0: Array, part: Part, total: float, mu: float, gap: float
+) -> tuple[list[Grasp], Counter[str]]:
+    """Return grasps of the part, those that use less friction first, and links in the way.
 
-    The hand's other joints are as in q0 (nq,). `wrench(placement)` (6,) is what acts on the part
-    beside the tips, about the world's origin; `total` [N] all their normal forces; `mu` the
-    friction there is; `gap` [m] that of each tip. `free(q)` and `free(q, placement)`
-    say whether no link is in another one, or in the part. The same call returns the same.
+    The hand's other joints are as in q0 (nq,). `total` [N] is the sum of all normal forces, which
+    balance the weight of the `part` with the friction `mu`; `gap` [m] is that of each tip. No link
+    is in another one, or in the part. The same call returns the same.
     """
-    found: list[Grasp] = []
-    places = itertools.islice(_places(hand, q0, shell, free), _MOST_PLACES)
-    for q_open, placement in places:
+    found, blocked, shell = list[Grasp](), Counter[str](), links.shell
+    for q_open, placement in itertools.islice(_places(hand, links, q0), _MOST_PLACES):
         closed = hand.close_on(q_open, shell, placement, gap)
-        if closed is None:
+        # The quickest first.
+        if closed is None or links.crossed(closed[0]):
             continue
         q, points, normals = closed
-        # The quickest first.
-        if not (free(q) and free(q, placement)):
-            continue
-        balance = least_friction(points, normals, wrench(placement), total, _USED * mu)
-        if balance is None:
-            continue
-        friction, forces = balance
-        found.append(Grasp(q, placement, points, normals, forces, friction))
+        if link := links.within(q, placement, whole=True):
+            blocked[link] += 1
+        elif balance := least_friction(points, normals, part.weight(placement), total, _USED * mu):
+            friction, forces = balance
+            found.append(Grasp(q, placement, points, normals, forces, friction))
         if len(found) == _ENOUGH:
             break
-    return sorted(found, key=lambda one: one.friction)
+    return sorted(found, key=lambda one: one.friction), blocked
 
 
-def _places(
-    hand: Hand, q0: Array, shell: Shell, free: Callable[..., bool]
-) -> Iterator[tuple[Array, pin.SE3]]:
+def _places(hand: Hand, links: Links, q0: Array) -> Iterator[tuple[Array, pin.SE3]]:
     """Yield postures of the hand with the part between its tips, the best fitting first.
 
     The part's box is turned in all 24 ways: one side across, between thumb and fingers.
     """
     from scipy.spatial.transform import Rotation
 
-    extent, middle = shell.box[1] - shell.box[0], shell.box.mean(axis=0)
+    extent, middle = np.ptp(links.shell.box, axis=0), links.shell.box.mean(axis=0)
     data = hand.model.createData()
     pin.forwardKinematics(hand.model, data, q0)
     # Where the fingers begin.
     root = np.mean([data.oMi[j].translation for j in hand.joints], axis=0)
     turns = np.round(Rotation.create_group("O").as_matrix())
     found: list[tuple[int, float, int, Array, pin.SE3]] = []
-    for _, q, thumb in itertools.islice(_postures(hand, q0, free), _BEST):
+    free = (one for one in _postures(hand, q0) if not links.crossed(one[1]))
+    for _, q, thumb in itertools.islice(free, _BEST):
         centers, across, width = hand.against(q, thumb)
         ahead = centers.mean(axis=0) - root
         ahead = unit(ahead - (ahead @ across) * across)
         frame = np.column_stack([across, ahead, np.cross(across, ahead)])
         center = centers[thumb] + 0.5 * width * across
-        room = width - 2 * float(hand.radii.mean())
         own: list[tuple[float, pin.SE3]] = []
-        for turn in turns:
+        for turn, offset in itertools.product(turns, _OFFSETS):
             sizes = np.abs(turn) @ extent  # along across, ahead and the third
-            misfit = abs(room - sizes[0]) / width
-            if misfit > _WIDER:
-                continue
-            rotation = frame @ turn
-            for offset in _OFFSETS:
-                at = center + offset * sizes[1] * ahead - rotation @ middle
-                own.append((misfit, pin.SE3(rotation, at)))
+            misfit = abs(width - 2 * float(hand.radii.mean()) - sizes[0]) / width
+            at = center + offset * sizes[1] * ahead - frame @ turn @ middle
+            if misfit <= _WIDER:
+                own.append((misfit, pin.SE3(frame @ turn, at)))
         own.sort(key=lambda one: one[0])
         ranked = enumerate(own)
         found += [(rank // _TURN, misfit, len(found), q, place) for rank, (misfit, place) in ranked]
     # A few places of each posture, then the next few.
     found.sort(key=lambda one: one[:3])
-    for *_, q, placement in found:
-        yield q, placement
+    yield from (one[3:] for one in found)
 
 
-def _postures(
-    hand: Hand, q0: Array, free: Callable[..., bool]
-) -> Iterator[tuple[float, Array, int]]:
-    """Yield postures in which one tip, the thumb, stands against all others; how well they do."""
-    rng = np.random.default_rng(0)
-    found: list[tuple[float, Array, int]] = []
-    bounded, (low, high) = hand.reaches[0].bounded, (hand.reaches[0].low, hand.reaches[0].high)
+def _postures(hand: Hand, q0: Array) -> list[tuple[float, Array, int]]:
+    """Return postures in which one tip, the thumb, stands against all others; how well they do."""
+    rng, found = np.random.default_rng(0), list[tuple[float, Array, int]]()
+    reach, widest = hand.reaches[0], float(hand.radii.max())
     for k in range(_POSTURES):
         thumb = k % len(hand.tips)
         # Fingers close alike, the thumb by itself.
@@ -234,18 +218,16 @@ def _postures(
         for one, chain in enumerate(hand.ranks):
             if one != thumb:
                 parts[chain] = alike[: len(chain)] + rng.normal(0, _ALIKE, len(chain))
-        q = q0.copy()
-        q[bounded] = low + np.clip(parts[bounded], _MARGIN, 1 - _MARGIN) * (high - low)
+        q, at = q0.copy(), np.clip(parts[reach.bounded], _MARGIN, 1 - _MARGIN)
+        q[reach.bounded] = reach.low + at * (reach.high - reach.low)
         centers, across, width = hand.against(q, thumb)
-        if width < 4 * hand.radii.max():
+        if width < 4 * widest:
             continue
         others = np.delete(centers, thumb, axis=0)
         uneven = float(np.ptp(others @ across)) / width
         inward = -hand.limbs() @ across
         inward[thumb] *= -1
         beside = np.linalg.norm(np.diff(others, axis=0), axis=1).min(initial=np.inf)
-        apart = beside > 2 * hand.radii.max()
-        if uneven < _UNEVEN and inward.min() > _INWARD and apart:
+        if uneven < _UNEVEN and inward.min() > _INWARD and beside > 2 * widest:
             found.append((uneven, q, thumb))
-    found.sort(key=lambda one: one[0])
-    yield from (one for one in found if free(one[1]))
+    return sorted(found, key=lambda one: one[0])

@@ -1,13 +1,13 @@
 """A new scenario in which a hand holds a free part between all its fingertips."""
 
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
@@ -17,11 +17,10 @@ from sphshell_pin.scenario.drafting.fingertips import every_finger
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand, grasps
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.part import Part
-from sphshell_pin.scenario.drafting.plan import Hold, Plan
+from sphshell_pin.scenario.drafting.part import GRAVITY, Part
+from sphshell_pin.scenario.drafting.plan import Hold, Materials, Plan
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT
-from sphshell_pin.scenario.drafting.searching import NewScenario, Search, coordinates
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Materials
+from sphshell_pin.scenario.drafting.searching import Search, coordinates
 from sphshell_pin.scenario.drafting.wording import rounded
 from sphshell_pin.shell.shell import Shell
 
@@ -34,11 +33,7 @@ _SAFETY, _MOST_RUNS = 3.0, 6
 _DRAWN = 0.1
 
 
-class CannotHold(SphshellError):
-    """No grasp of all fingertips that were asked for holds the part."""
-
-
-class TooHeavy(CannotHold):
+class TooHeavy(SphshellError):
     """There are grasps, and none of them bears the part's weight."""
 
 
@@ -65,66 +60,51 @@ class HoldSearch(Search):
     Where all tips cannot, those do without the fingers of the fewest joints, three at least.
     """
 
-    def find(self) -> NewScenario:
-        """Return the first draft that holds the part; SphshellError if none does."""
+    refused: list[SphshellError]
+    """Why none of so many tips, or fewer, can hold it."""
+
+    def drafts(self) -> Iterator[Plan]:
+        """Yield grasps of all tips, then of fewer."""
         if floats(self.model):
             raise SphshellError("a hand with a free root cannot hold a part: leave out --base")
-        tips, refused, last = self.tips, "", CannotHold()
+        tips, self.refused = self.tips, []
         ranks = Hand(self.model, tips).ranks
         order = sorted(range(len(tips)), key=lambda k: -len(ranks[k]))
         for count in range(len(tips), min(len(tips), 3) - 1, -1):
-            try:
-                found = self._held([tips[k] for k in sorted(order[:count])])
-            except CannotHold as error:
-                refused, last = refused or str(error), error
-                continue
-            if refused:
-                note = f"{count} of {len(tips)} fingertips hold it: {refused.partition(';')[0]}"
-                found = replace(found, why=(note, *found.why))
-            return found
-        raise last
+            for plan in self._grasps([tips[k] for k in sorted(order[:count])]):
+                said = [str(error).partition(";")[0] for error in self.refused[:1]]
+                notes = [f"{count} of {len(tips)} fingertips hold it: {one}" for one in said]
+                yield replace(plan, why=(*notes, *plan.why))
 
-    def _held(self, tips: Sequence[Tip]) -> NewScenario:
-        """Return a scenario in which all of the `tips` hold the part; CannotHold if none works."""
+    def refusal(self) -> SphshellError:
+        """Return why the fewest tips do not hold it."""
+        return self.refused[-1]
+
+    def _grasps(self, tips: Sequence[Tip]) -> Iterator[Plan]:
+        """Yield drafts in which all of the `tips` hold the part; say at the end why none works."""
         press, shell = self.asked.press, self.shell
-        sphere = find_material(self.asked.material or "rubber")
-        materials = Materials(sphere, find_material(self.asked.against or "steel"))
+        names = self.asked.material or "rubber", self.asked.against or "steel"
+        materials = Materials(*map(find_material, names))
         part, hand = Part.of(shell, materials.surface), Hand(self.model, tips)
-        total = _SAFETY * part.mass * GRAVITY / materials.friction if press is None else 2.0 * press
-        links, blocked = self.links(tips, hand.lock, self.q0), list[str]()
-
-        def free(q: Array, placement: pin.SE3 | None = None) -> bool:
-            if placement is None:
-                return not links.crossed(q)
-            found = links.within(q, placement, whole=True)
-            blocked.extend([] if found is None else [found])
-            return found is None
-
-        found = grasps(hand, self.q0, shell, part.weight, total, materials.friction, GAP, free)
-        if not found:
-            raise _no_grasp(shell, len(tips), blocked)
-        said = ""
+        mu, weight = materials.friction, part.inertia.mass * GRAVITY
+        total = _SAFETY * weight / mu if press is None else 2.0 * press
+        links, said = self.hold_links(tips, hand.lock, self.q0), ""
+        found, blocked = grasps(hand, links, self.q0, part, total, mu, GAP)
         for one in found[:_MOST_RUNS]:
-            grasp = _pressed(one, part, press, materials.friction)
-            plan = _planned(hand, grasp, shell, part, materials)
-            if isinstance(plan, str):
-                said = plan
-                continue
-            section = self.locked(hand.lock, label="hand", start=_angles(hand, grasp.q))
-            works = self.run(section, plan, links)
-            if works is not None:
-                return works
-            said = self.faults[-1].text
-        raise TooHeavy(
+            try:
+                yield _planned(hand, _pressed(one, part, press, mu), shell, part, materials)
+                said = self.faults[-1].text
+            except SphshellError as error:
+                said = str(error)
+        heavy = (
             f"no grasp of {min(len(found), _MOST_RUNS)} that were tried works: {said}; a lighter "
             "--against, another --press, or a smaller part"
         )
+        self.refused.append(TooHeavy(heavy) if found else _no_grasp(shell, len(tips), blocked))
 
 
-def _planned(
-    hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: Materials
-) -> Plan | str:
-    """Plan a scenario with the grasp; what is wrong with it before anything is run."""
+def _planned(hand: Hand, grasp: Grasp, shell: Shell, part: Part, materials: Materials) -> Plan:
+    """Plan a scenario with the grasp; SphshellError for what is wrong before anything is run."""
     model, forces, torques = hand.model, grasp.normal_forces(), hand.torques(grasp)
     radius, press = float(hand.radii.min()), float(forces.max())
     weight = pin.computeGeneralizedGravity(model, model.createData(), grasp.q)
@@ -132,9 +112,10 @@ def _planned(
     stated = (limits > 0) & (limits < NO_LIMIT)
     over = np.flatnonzero(stated & (np.abs(torques + weight) > limits))
     if len(over):
-        return f"the effort limit of {limits[over[0]]:g} N m allows no press of {press:.3g} N"
+        limit = f"the effort limit of {limits[over[0]]:g} N m"
+        raise SphshellError(f"{limit} allows no press of {press:.3g} N")
     if said := materials.too_deep(press, radius):
-        return said
+        raise SphshellError(said)
     kp = rounded(float(np.abs(torques).max()) / _DRAWN)
     inertia = np.diag(mass_matrix(model, grasp.q))[hand.reaches[0].columns]
     kd = rounded(1.4 * math.sqrt(kp * float(np.median(inertia))))
@@ -142,44 +123,30 @@ def _planned(
     depths = (forces / [materials.stiffness(float(one)) for one in hand.radii]) ** (2 / 3)
     pressed = hand.close_on(grasp.q, shell, grasp.placement, -depths)
     deep = grasp.q if pressed is None else pressed[0]
-    drawn = _angles(hand, pin.integrate(model, deep, torques / kp), "hand/")
-    used = grasp.friction / materials.friction
+    angles = coordinates(model, pin.integrate(model, deep, torques / kp))
+    drawn = {f"hand/{name}": angles[name] for name in (model.names[j] for j in hand.joints)}
+    used, mass = grasp.friction / materials.friction, part.inertia.mass
     frames = ", ".join(f"'{tip.frame}'" for tip in hand.tips)
     why = (
         f"{len(hand.tips)} fingertips, {hand.tips[0].source}: {frames}",
-        f"the part is {materials.surface.name} all through and weighs {part.mass:.3g} kg",
+        f"the part is {materials.surface.name} all through and weighs {mass:.3g} kg",
         f"the fingertips press with {press:.3g} N at most; its weight and their forces use "
         f"{100 * used:.0f} % of the friction",
     )
-    return Plan(
-        hand.tips,
-        materials.sticking(radius, 0.1, press, part.mass / len(hand.tips)),
-        Hold(kp, kd, _DRAWN, drawn, press),
-        DURATION,
-        GAP,
-        grasp.placement,
-        pin.SE3ToXYZQUAT(grasp.placement),
-        why,
-        part,
-        int(np.argmax(forces)),
-    )
+    contact, k = materials.sticking(radius, 0.1, press, mass / len(hand.tips)), int(forces.argmax())
+    start = DURATION, GAP, grasp.q, hand.lock, grasp.placement
+    control = Hold(kp, kd, _DRAWN, drawn, press)
+    return Plan(hand.tips, contact, control, *start, why, part, strongest=k)
 
 
-def _angles(hand: Hand, q: Array, prefix: str = "") -> dict[str, object]:
-    """Return the coordinates of the joints that move the tips."""
-    found, names = coordinates(hand.model, q), [hand.model.names[j] for j in hand.joints]
-    return {prefix + name: found[name] for name in names}
-
-
-def _no_grasp(shell: Shell, count: int, blocked: Sequence[str]) -> CannotHold:
-    sizes = " x ".join(f"{1e3 * one:.3g}" for one in shell.box[1] - shell.box[0])
-    if blocked:
-        link = max(set(blocked), key=blocked.count)
-        return CannotHold(
+def _no_grasp(shell: Shell, count: int, blocked: Counter[str]) -> SphshellError:
+    sizes = " x ".join(f"{1e3 * one:.3g}" for one in np.ptp(shell.box, axis=0))
+    for link, _ in blocked.most_common(1):
+        return SphshellError(
             f"link '{link}' would be in the part, or another one, wherever all {count} fingertips "
             f"touch it and could hold it: take a part of another size than {sizes} mm"
         )
-    return CannotHold(
+    return SphshellError(
         f"the {count} fingertips cannot hold a part of {sizes} mm: nowhere that was tried do all "
         "touch it with forces inside their friction cones; take a part of another size, or its "
         "--unit"

@@ -1,7 +1,7 @@
 """Where a limb ends, by the geometry of its last link: the sphere to put there."""
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -61,6 +61,13 @@ def joint_of(model: pin.Model, frame: str) -> int:
     return int(model.frames[find_frame(model, frame)].parentJoint)
 
 
+def sphere_centers(model: pin.Model, q: Array, tips: Sequence[Tip]) -> Array:
+    """Return the spheres' centers (k, 3) [m] in the world at q (nq,)."""
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, q)
+    return np.array([data.oMf[find_frame(model, tip.frame)].act(tip.offset) for tip in tips])
+
+
 def gripper_joints(model: pin.Model) -> set[int]:
     """Return the joints of grippers: behind a joint, two ends or more that slide or are coupled.
 
@@ -69,28 +76,28 @@ def gripper_joints(model: pin.Model) -> set[int]:
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
+    slide = {j for j in range(model.njoints) if _slides(model.joints[j])}
     for carrier in range(1, model.njoints):
-        behind = [int(one) for one in model.subtrees[carrier]][1:]
-        ends = set(behind) - {int(model.parents[one]) for one in behind}
-        jaws = {
-            one
-            for one in behind
-            if model.names[one] in coupled
-            or model.joints[one].shortname().startswith("JointModelP")
-        }
+        behind = set(map(int, model.subtrees[carrier])) - {carrier}
+        ends = behind - {int(model.parents[one]) for one in behind}
+        jaws = {one for one in behind if model.names[one] in coupled} | (behind & slide)
         few = len({model.joints[one].idx_v for one in behind}) <= 3
+        sliding = few and len(ends & jaws) > 1 and behind == ends | jaws
         named = all("gripper" in model.names[one].lower() for one in behind)
-        sliding = few and len(ends & jaws) > 1 and set(behind) == ends | jaws
         if len(ends) > 1 and (named or sliding):
-            found |= set(behind)
+            found |= behind
     return found
+
+
+def _slides(joint: pin.JointModel) -> bool:
+    return bool(joint.shortname().startswith("JointModelP"))
 
 
 class LinkGeometry:
     """The corners of the geometry that moves with a frame of a robot, in that frame.
 
-    A gripper that it carries is part of it, as the start has it. They are those of its collision
-    geometry; where it has none, of its visual one.
+    A gripper that it carries is part of it, as the start has it; of a free body all that it
+    carries. They are those of its collision geometry; where it has none, of its visual one.
     """
 
     def __init__(self, robot: LoadedRobot, frame: str) -> None:
@@ -98,22 +105,25 @@ class LinkGeometry:
         self._robot, self._model = robot, model
         self._frame = model.frames[find_frame(model, frame)]
         self._joint = int(self._frame.parentJoint)
-        self._jaws = gripper_joints(model) & {int(one) for one in model.subtrees[self._joint]}
-        self._jaws -= {self._joint}
-        both = robot.collision_model, robot.visual_model
-        shown = [int(one.parentFrame) for each in both for one in each.geometryObjects]
-        bodies = [k for k in sorted(shown) if model.frames[k].parentJoint == self._joint]
-        self.link = model.frames[bodies[0]].name if bodies else frame
-        self.corners = moved(
-            self._frame.placement.inverse(), self._corners(self._joint, {self._joint, *self._jaws})
+        behind = set(model.subtrees[self._joint]) - {self._joint}
+        # All that a free body carries is held.
+        self._free = model.joints[self._joint].nv == 6
+        self._on_rim, jaws = False, behind & gripper_joints(model)
+        self._jaws = behind if self._free else jaws
+        both = [*robot.collision_model.geometryObjects, *robot.visual_model.geometryObjects]
+        shown = [int(one.parentFrame) for one in both if one.parentJoint == self._joint]
+        self.link = model.frames[min(shown)].name if shown else frame
+        self.corners, self._solid = (
+            moved(self._frame.placement.inverse(), self._corners(self._joint, {self._joint, *held}))
+            for held in (self._jaws, jaws)
         )
 
     def depth(self, center: Array) -> float:
-        """Return how far `center` (3,) [m] is inside the convex hull [m]; negative outside."""
+        """Return how far `center` (3,) [m] is in the link's convex hull [m]; negative outside."""
         from scipy.spatial import ConvexHull, QhullError
 
         try:
-            hull = ConvexHull(self.corners)
+            hull = ConvexHull(self._solid)
         except (QhullError, ValueError):  # flat, or nothing
             return -math.inf
         return float(-(hull.equations[:, :3] @ center + hull.equations[:, 3]).max())
@@ -137,12 +147,12 @@ class LinkGeometry:
             if 0 < covers <= reach:  # not on a corner alone
                 break
         before = float(along.max() - center @ ahead)
-        # Open jaws may lie in a ball, but are no round end.
-        if radius is None and not self._jaws and covers - before < _STANDS_OUT * covers:
+        # Open jaws may lie in a ball, but are no round end; a ball about its axis would not move.
+        fits = covers - before < _STANDS_OUT * covers and not self._on_rim
+        if radius is None and fits and (self._free or not self._jaws):
             covering = f"it covers the end of link '{self.link}'"
             return Tip(name, rounded(covers), center, covering, end="round")
-        floats = self._model.joints[self._joint].nv == 6
-        least = _OF_BODY * size if floats else 0.0
+        least = _OF_BODY * size if self._free else 0.0
         ball = rounded(max(_BALL * covers, least)) if radius is None else radius
         front, still = center + (before + ball) * ahead, ahead if radius is None else None
         return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, "flat")
@@ -151,16 +161,17 @@ class LinkGeometry:
         """Return the unit vector (3,) towards the end, in the frame.
 
         To the jaws of a gripper; of a body that floats down. Else away from the joint's axis;
-        along it where the link is about it, away from the link before.
+        along it where the link is about it, away from the link before; if the frame cannot move
+        along it, to the rim.
         """
         model, place = self._model, self._frame.placement.inverse()
         here = _middle(self.corners)
+        if self._free:
+            return np.asarray(-place.rotation[:, 2])
         if self._jaws:
             jaws, wrist = (self._corners(self._joint, one) for one in (self._jaws, {self._joint}))
             return unit(place.rotation @ (_middle(jaws) - _middle(wrist)))
         joint = model.joints[self._joint]
-        if joint.nv == 6:
-            return np.asarray(place.rotation @ np.array([0.0, 0.0, -1.0]))
         parent = int(model.parents[self._joint])
         before = self._corners(parent, {parent})
         behind = place.act(model.jointPlacements[self._joint].actInv(_middle(before)))
@@ -169,23 +180,24 @@ class LinkGeometry:
             motion = np.ravel(joint.createData().S)
             axis = place.rotation @ (motion[:3] + motion[3:])
             aside = (here - origin) - axis * (axis @ (here - origin))
-            if joint.shortname().startswith("JointModelP"):
-                aside = np.zeros(3)
             size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
-            if np.linalg.norm(aside) >= _AT_AXIS * size:
+            if not _slides(joint) and np.linalg.norm(aside) >= _AT_AXIS * size:
                 away = aside
             elif self._moves_along(axis):
                 away = axis * np.sign(axis @ away or 1.0)
             else:
                 away = away - axis * (axis @ away)
+                if np.linalg.norm(away) < _AT_AXIS * size:  # a disc ends anywhere on its rim
+                    rim = self.corners - origin - np.outer((self.corners - origin) @ axis, axis)
+                    away, self._on_rim = rim[int(np.argmax(np.linalg.norm(rim, axis=1)))], True
         return unit(away)
 
     def _moves_along(self, axis: Array) -> bool:
         """Whether the frame can move along an `axis` (3,): a mechanism in a plane does not."""
         reach = Reach(self._model, self._frame.name, np.zeros(3))
         q = pin.integrate(self._model, self._robot.q0, np.full(self._model.nv, 0.3))
-        jacobian, pose = reach.jacobian(q)[:3], reach.data.oMf[reach.frame]
-        return bool(np.abs(pose.rotation @ axis @ jacobian).max(initial=0.0) > _STILL)
+        moves = reach.jacobian(q)[:3].T @ reach.data.oMf[reach.frame].rotation @ axis
+        return bool(np.abs(moves).max(initial=0.0) > _STILL)
 
     def _corners(self, joint: int, joints: Collection[int]) -> Array:
         """Return the corners (k, 3) [m] of the geometry of `joints`, in the frame of `joint`."""
@@ -206,9 +218,7 @@ class LinkGeometry:
 
 
 def _middle(points: Array) -> Array:
-    if not len(points):
-        return np.zeros(3)
-    return np.asarray(0.5 * (points.min(axis=0) + points.max(axis=0)))
+    return 0.5 * (points.min(axis=0) + points.max(axis=0)) if len(points) else np.zeros(3)
 
 
 def _smallest_ball(points: Array) -> tuple[Array, float]:

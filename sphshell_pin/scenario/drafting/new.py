@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.regular_file import why_no_file
@@ -20,10 +18,10 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, S
 from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
 from sphshell_pin.robots.inertia import few, lacks_masses, lacks_moments
 from sphshell_pin.scenario.drafting.asked import WORDS, Asked
-from sphshell_pin.scenario.drafting.dropping import DropSearch, sphere_centers
+from sphshell_pin.scenario.drafting.dropping import DropSearch
 from sphshell_pin.scenario.drafting.fingertips import find_tips, only_turns
 from sphshell_pin.scenario.drafting.hand import HoldSearch, TooHeavy, every_tip
-from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip
+from sphshell_pin.scenario.drafting.limb_ends import LinkGeometry, Tip, sphere_centers
 from sphshell_pin.scenario.drafting.part import part_file
 from sphshell_pin.scenario.drafting.pose_search import PressSearch
 from sphshell_pin.scenario.drafting.poses import joints_aside
@@ -64,99 +62,79 @@ def new_scenario(
         What cannot be found out and is not given, a file that cannot be read or written, or that no
         draft works: the text says what fails in it and what to change.
     """
-    asked = Asked(robot, surface, **options)
-
-    def instead(note: str, **changes: Any) -> NewScenario:
-        made = _written(replace(asked, **changes))
-        return replace(made, why=(note, *made.why))
-
-    try:
-        return _written(asked)
-    except CannotReach as error:
-        said, stated = str(error).partition(";")[0], asked.frame and asked.radius
-        farther = [error.out]
-        for other in error.others[:_MOST_ENDS] if asked.frame is None else ():
-            try:
-                return instead(f"frame '{other}', as with '{error.frame}' {said}", frame=other)
-            except CannotReach as another:
-                farther.append(another.out)
-            except SphshellError:
-                pass
-        # A sphere of which the place is asked for stays there.
-        for tip in farther if asked.offset is None and not stated else ():
-            with suppress(SphshellError):
-                if tip is not None:
-                    return _written(asked, tip)
-        raise
-    except TooHeavy as error:
-        if asked.against is not None:
-            raise
-        said = str(error).partition(";")[0]
-        return instead(f"the part is of plastic, as with steel {said}", against="plastic")
-    except RobotError as error:
-        if not asked.mimic:
-            raise
-        said = str(error).partition(";")[0]
+    first = Asked(robot, surface, **options)
+    attempts: list[tuple[tuple[str, ...], Asked]] = [((), first)]
+    for notes, asked in attempts:
         try:
-            return instead(
-                f"joints that are coupled move freely (--no-mimic), as else: {said}", mimic=False
-            )
-        except RobotError:
-            raise error from None
-    except CannotStand as error:
-        if asked.base is not None:
-            raise
+            made = _written(asked)
+        except SphshellError as error:
+            if (asked.frame, asked.tip) == (first.frame, first.tip):
+                refused = error
+            attempts += [
+                ((*notes, note), replace(asked, **changes))
+                for note, changes in _instead(error, asked)
+            ]
+        else:
+            return replace(made, why=tuple(one for one in (*notes, *made.why) if one))
+    raise refused
+
+
+def _instead(error: SphshellError, asked: Asked) -> list[tuple[str, dict[str, Any]]]:
+    """Return what to try where that fails which is asked for: why, and what is asked instead."""
+    said = str(error).partition(";")[0]
+    if isinstance(error, CannotReach) and asked.tip is None:
+        others = error.others[:_MOST_ENDS] if asked.frame is None else ()
+        limbs = [(f"frame '{one}', as with '{error.frame}' {said}", one) for one in others]
+        # A sphere of which the place is asked for stays there.
+        stays = asked.offset is not None or (asked.frame and asked.radius) or error.out is None
+        farther = [] if stays else [("", {"tip": error.out})]
+        return [*((note, {"frame": frame}) for note, frame in limbs), *farther]
+    if isinstance(error, TooHeavy) and asked.against is None:
+        return [(f"the part is of plastic, as with steel {said}", {"against": "plastic"})]
+    if isinstance(error, RobotError) and asked.mimic:
+        note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
+        return [(note, {"mimic": False})]
+    if isinstance(error, CannotStand) and asked.base is None:
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-    made = new_scenario(robot, surface, **{**options, "base": "fixed"})
-    return replace(made, why=(note, *made.why))
+        return [(note, {"base": "fixed"})]
+    return []
 
 
-def _written(asked: Asked, tip: Tip | None = None) -> NewScenario:
-    """Write the scenario that is asked for, with this `tip` if it is given.
-
-    CannotStand as DropSearch raises it.
-    """
+def _written(asked: Asked) -> NewScenario:
+    """Write the scenario that is asked for; errors as of `new_scenario`."""
     file = _free_path(asked)
     section, bare, shaped = _bare(asked, file)
     loaded, radius, in_hand = bare.assembly.loaded[0], asked.radius, asked.tips == "all"
     if radius and (too_large := radius_fault(bare.assembly.model, radius)):
         raise InvalidParameter("radius", radius, too_large)
-    if tip is not None:
-        tips = [tip]
-    elif in_hand:
+    tips: Sequence[Tip] = [asked.tip] if asked.tip is not None else ()
+    if in_hand:
         tips = every_tip(loaded, asked)
-    else:
+    elif not tips:
         tips = find_tips(
             loaded, shipped=section.name, frame=asked.frame, radius=radius, offset=asked.offset
         )
     check_masses(bare.assembly, joints_aside(bare.assembly.model, tips))
-    shell = _shell_section(asked, file, bare, tips)
-    built = _build_bare(section, file, shell, reuse=bare)
-    tips = tips if tip else _sized_to(built, tips, asked)
+    built = _build_bare(section, file, _shell_section(asked, file, bare, tips), reuse=bare)
+    tips = _sized_to(built, tips, asked)
     built = _sided(built, tips, inside=asked.inside)
     # What is written is what was built, and tried.
     search: type[Search] = DropSearch if floats(built.assembly.model) else PressSearch
     try:
         made = (HoldSearch if in_hand else search)(asked, built, tips, file).find()
-    except CannotStand:
-        raise
     except SphshellError as error:
-        if shaped != "fixed" or in_hand:
-            raise
-        raise SphshellError(f"{error}; or let it float, --base floating") from None
+        if shaped == "fixed" and not in_hand:
+            error.args = (f"{error}; or let it float, --base floating",)
+        raise
     if made.part:
-        part = file.with_name(part_file(file.stem))
-        _check_free(part, force=asked.force)
-        write_whole(part, made.part.encode())
+        write_whole(file.with_name(part_file(file.stem)), made.part.encode())
     write_whole(file, made.text.encode())
-    shape = shaped and not in_hand and f"the base is {shaped}, by the robot's shape: or --base"
+    shape = f"the base is {shaped}, by the robot's shape: or --base"
     masses = loaded.assumed
-    if masses and asked.density is None:
-        masses += ": another with --density"
+    masses += ": another with --density" if masses and asked.density is None else ""
     idle = few([repr(one) for one in joints_without_mass(loaded.model, loaded.q0)])
     idle = idle and f"held, as nothing that they move has a mass: joints {idle}"
-    why = tuple(one for one in (shape, *made.why, masses, idle) if one)
-    return replace(made, why=why)
+    return replace(made, why=(shape if shaped and not in_hand else "", *made.why, masses, idle))
 
 
 def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
@@ -166,44 +144,49 @@ def _bare(asked: Asked, file: Path) -> tuple[RobotSection, Built, str | None]:
     """
     section = _robot_section(asked, file)
     bare = _build_bare(section, file)
-    loaded, changed = bare.assembly.loaded[0], dict[str, object]()
-    shaped = None if asked.base is not None else _base(bare.assembly.model)
-    if (base := shaped or asked.base) != section.base:
-        changed["base"] = base
-    states = section.name is not None or asked.density is not None
-    floating = base == "floating"
-    lacks = lacks_moments(loaded.description) or lacks_masses(
-        loaded.model, loaded.description, floating=floating
-    )
-    if not states and lacks:
-        changed["density"] = _DENSITY
-    if changed:
-        section = section.model_copy(update=changed)
+    loaded, density = bare.assembly.loaded[0], asked.density
+    model, shaped = loaded.model, None
+    if asked.base is None:
+        # A single body floats, with rotors or wheels too; a single limb is an arm, and what stands
+        # beside a free body is not carried by it.
+        roots, limbs = (list(model.parents)[1:].count(joint) for joint in (0, 1))
+        if not model.nv or (not floats(model) and only_turns(model)):
+            shaped = "floating"
+        elif floats(model) and (limbs == 1 or roots > 1):
+            shaped = "fixed"
+    base = shaped or asked.base
+    if section.name is None and density is None:
+        known, free = loaded.description, base == "floating"
+        if lacks_moments(known) or lacks_masses(model, known, floating=free):
+            density = _DENSITY
+    if (base, density) != (section.base, section.density):
+        section = section.model_copy(update={"base": base, "density": density})
         bare = _build_bare(section, file)
     return section, bare, shaped
 
 
-def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> list[Tip]:
+def _sized_to(built: Built, tips: Sequence[Tip], asked: Asked) -> Sequence[Tip]:
     """Return the `tips`, balls of free size that press on a file's surface as it needs them.
 
-    A round end that is larger than the surface gets a smaller ball on it.
+    A round end that is larger than the surface gets a smaller ball on it, but of a shipped robot.
     """
-    if asked.word is not None or asked.tips == "all" or asked.radius is not None:
-        return list(tips)
-    (made,) = built.shells.values()
+    (made,), floating = built.shells.values(), floats(built.assembly.model)
+    shipped = built.scenario.robot[0].name is not None
     middle = float(np.sort(np.ptp(made.box, axis=0))[1])
-    floating = floats(built.assembly.model)
+    stated = asked.radius is not None or asked.tip is not None or asked.tips == "all"
+    if asked.word is not None or stated:
+        return tips
     most = rounded(
         0.5 * made.size if floating else min(_BALL * middle, _OF_ROOM * widest_room(made))
     )
-    sized = list[Tip]()
-    for tip in tips:
+
+    def sized(tip: Tip) -> Tip:
         large = tip.radius > made.size
-        if most and large and tip.end == "round":
-            sized.append(LinkGeometry(built.assembly.loaded[0], tip.frame).end(most))
-        else:
-            sized.append(tip.at_most(most) if most and (large or not floating) else tip)
-    return sized
+        if large and tip.ahead is None and asked.offset is None and not shipped:
+            return LinkGeometry(built.assembly.loaded[0], tip.frame).end(most)
+        return tip.at_most(most) if large or not floating else tip
+
+    return [sized(tip) for tip in tips] if most else tips
 
 
 def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
@@ -220,18 +203,11 @@ def _sided(built: Built, tips: Sequence[Tip], *, inside: bool) -> Built:
         )
     if not made.is_closed:
         return built
-    side = "inside" if inside else "outside"
+    side = {"side": "inside" if inside else "outside"}
     # The surface is not read again.
-    turned = made.from_surface(made.surface(), **{**made.options, "side": side})
-    scenario = built.scenario.model_copy(
-        update={"shell": [section.model_copy(update={"side": side})]}
-    )
+    turned = made.from_surface(made.surface(), **{**made.options, **side})
+    scenario = built.scenario.model_copy(update={"shell": [section.model_copy(update=side)]})
     return replace(built, scenario=scenario, shells={section.name: turned})
-
-
-def _check_free(path: Path, *, force: bool) -> None:
-    if path.is_dir() or (path.exists() and not force):
-        raise ScenarioError(path, "", "is there already: give another --out, or --force")
 
 
 def _free_path(asked: Asked) -> Path:
@@ -239,7 +215,10 @@ def _free_path(asked: Asked) -> Path:
     path = Path(f"{robot}_on_{surface}.toml" if asked.out is None else asked.out)
     if path.suffix != ".toml":
         raise ScenarioError(path, "", "a scenario's file must end in .toml")
-    _check_free(path, force=asked.force)
+    part = [path.with_name(part_file(path.stem))] if asked.tips == "all" else []
+    for one in (path, *part):
+        if one.is_dir() or (one.exists() and not asked.force):
+            raise ScenarioError(one, "", "is there already: give another --out, or --force")
     if not path.parent.is_dir():
         raise ScenarioError(path, "", f"the folder {path.parent} does not exist")
     return path
@@ -255,27 +234,17 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
                 f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot), base=base, mimic=asked.mimic)
-    place, is_urdf = _relative(file, path), file.suffix.lower() == ".urdf"
+    source: dict[str, Any] = {
+        "urdf" if file.suffix.lower() == ".urdf" else "file": _relative(file, path)
+    }
     return RobotSection(
-        urdf=place if is_urdf else None,
-        file=None if is_urdf else place,
+        **source,
         package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
         base=base,
         density=asked.density,
         mimic=asked.mimic,
     )
-
-
-def _base(model: pin.Model) -> Literal["fixed", "floating"] | None:
-    """Return what the base has to be by the robot's shape; None: what its file states will do.
-
-    A single body floats, with rotors or wheels too; a single limb is an arm.
-    """
-    if not model.nv or (not floats(model) and only_turns(model)):
-        return "floating"
-    limbs = sum(int(parent) == 1 for parent in model.parents)
-    return "fixed" if floats(model) and limbs == 1 else None
 
 
 def _relative(file: Path, path: Path) -> str:
@@ -305,7 +274,7 @@ def _build_bare(
 
 def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) -> ShellSection:
     """Return the surface's table."""
-    file, word, parts = Path(asked.surface), asked.word, (asked.bodies, asked.faces)
+    file, word = Path(asked.surface), asked.word
     if word is None:
         return ShellSection(
             name=file.stem.replace(".", "-"),
@@ -318,18 +287,19 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         if file.suffix:
             raise SphshellError(f"surface {file}: {why_no_file(file)}")
         raise NameNotFound("surface", word, "the command (beside files)", WORDS)
-    if asked.unit is not None:
-        raise SphshellError(f"a unit belongs to a surface file; the {word} is sized in meters")
-    if parts != (None, None):
-        raise SphshellError(f"bodies and faces belong to a CAD file, not to the {word}")
+    if (asked.unit, asked.bodies, asked.faces) != (None, None, None):
+        said = f"not to the {word}, which is sized in meters"
+        raise SphshellError(f"a unit, bodies and faces belong to a surface file, {said}")
     if asked.tips == "all" and word not in HELD_WORDS:
         said = f"a hand cannot hold a {word}: --tips all takes {', '.join(HELD_WORDS)}"
         raise SphshellError(said)
     largest = max(tip.radius for tip in tips)
     half, length = _IN_HAND * largest, 4 * _IN_HAND * largest
     if asked.tips == "one":
-        spread = float(np.linalg.norm(np.ptp(sphere_centers(built, tips), axis=0)))
-        half = _round_up(max(_SIZE * largest, spread))
+        centers = sphere_centers(built.assembly.model, built.assembly.q0, tips)
+        spread = float(np.linalg.norm(np.ptp(centers, axis=0)))
+        least = max(_SIZE * largest, spread)
+        half = rounded(least) if rounded(least) >= least else rounded(1.05 * least)
         length = (0.4 if word == "box" else 2.0) * half
     primitives: dict[str, Primitive] = {
         "plane": HalfSpace(2 * half),
@@ -339,9 +309,3 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         "cylinder": Cylinder(radius=half, length=length),
     }
     return ShellSection(name=word, primitive=primitives[word])
-
-
-def _round_up(x: float) -> float:
-    """Round to the next higher number of two digits."""
-    rounded = float(f"{x:.2g}")
-    return rounded if rounded >= x else float(f"{1.05 * x:.2g}")

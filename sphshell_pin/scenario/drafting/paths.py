@@ -8,14 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.scenario.drafting.asked import Asked
+from sphshell_pin.scenario.drafting.asked import SHAPES, Asked
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.placing import Place, nearer
-from sphshell_pin.scenario.drafting.touch_points import (
-    TouchPoint,
-    paths_on_surface,
-    touches_once,
-)
+from sphshell_pin.scenario.drafting.touch_points import TouchPoint, paths_on_surface, touches_once
 from sphshell_pin.scenario.drafting.vectors import moved, tangents
 from sphshell_pin.scenario.drafting.wording import mm
 from sphshell_pin.shell.shell import Shell
@@ -71,7 +67,8 @@ def find_way(
     if stance.slide is None:
         return Way(stays, why="its joints cannot move it across the surface")
     part = nearer(place.placement, room * stance.approach)
-    length = min(PATH_RADII * radius, PATH_REACH * stance.reach)
+    length = asked.length or min(PATH_RADII * radius, PATH_REACH * stance.reach)
+    whole = isinstance(asked.path, np.ndarray) or asked.path in SHAPES[1:]
     best, most_on_surface, reason = Way(stays), 0.0, ""
     direction = place.placement.rotation.T @ stance.slide
     for points, smooth in _tried(asked, shell, touch, direction, radius, length):
@@ -86,12 +83,12 @@ def find_way(
         world = moved(place.placement, fine[:count] + (radius + gap) * normals[:count])
         count, why = stance.follows(world, lambda q: links.within(q, part) is None)
         reason = why or reason
-        if asked.whole and count < len(fine):
+        if whole and count < len(fine):
             continue
         way = Way(points if count == len(fine) else fine[:count], smooth)
         if way.length > best.length:
             best = way
-        if best.length >= ENOUGH * (asked.length or length):
+        if best.length >= ENOUGH * length:
             return best
     if asked.path is None and best.length >= SHORTEST_PATH * radius:
         return best
@@ -103,25 +100,23 @@ def find_way(
 
 
 def _tried(
-    asked: Asked, shell: Shell, touch: TouchPoint, direction: Array, radius: float, length: float
+    asked: Asked, shell: Shell, touch: TouchPoint, direction: Array, radius: float, size: float
 ) -> Iterator[tuple[Array, bool]]:
-    """Yield paths (k, 3) on the surface, and whether they are smooth; `length` by default."""
-    size = length if asked.length is None else asked.length
+    """Yield paths (k, 3) on the surface, and whether they are smooth; shapes over `size` [m]."""
     if isinstance(asked.path, np.ndarray):
         yield shell.closest_points(asked.path).points, False
         return
-    if asked.path is None or asked.path == "line":
-        for path in paths_on_surface(shell, touch, direction, size, 0.5 * radius):
-            yield path, True
+    if asked.path in (None, "line"):
+        paths = paths_on_surface(shell, touch, direction, size, 0.5 * radius)
+        yield from ((path, True) for path in paths)
         return
     first, second = tangents(touch.normal, direction)
     if asked.path == "circle":
         turns = np.linspace(0.0, 2.0 * np.pi, _AROUND + 1)
         plane = size / (2 * np.pi) * np.array([np.cos(turns) - 1.0, np.sin(turns)]).T
     else:
-        edge = size / (_STROKES + 1)
-        along = np.tile([0.0, edge, edge, 0.0], _STROKES)[: 2 * _STROKES]
-        plane = np.array([along, np.repeat(np.linspace(0.0, edge, _STROKES), 2)]).T
+        edge, rows = size / (_STROKES + 1), np.repeat(np.linspace(0.0, 1.0, _STROKES), 2)
+        plane = edge * np.array([np.resize([0.0, 1.0, 1.0, 0.0], len(rows)), rows]).T
     for axes in ((first, second), (-first, -second), (second, -first), (-second, first)):
         flat = touch.point + plane @ np.array(axes)
         yield shell.closest_points(flat).points, asked.path == "circle"

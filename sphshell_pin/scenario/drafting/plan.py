@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.contact.materials import (
+    Material,
+    find_material,
+    friction_between,
+    restitution_between,
+)
 from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.part import Part
+from sphshell_pin.scenario.drafting.part import GRAVITY, Part
 from sphshell_pin.scenario.drafting.paths import Way
 from sphshell_pin.scenario.drafting.placing import Place
 from sphshell_pin.scenario.drafting.poses import NO_LIMIT, Stance
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY, Contact, Materials
 from sphshell_pin.scenario.drafting.wording import axis_name, listed, mm, rounded
 
 # Gap of a tip at the start, as a part of its radius.
@@ -44,6 +50,80 @@ WEAK = (
     "the effort limits that the robot's file states for its joints are not modeled, because they "
     "do not bear its own weight, friction and this motion"
 )
+
+
+class Materials(NamedTuple):
+    """What a sphere and a surface are made of; lengths in [m], forces in [N]."""
+
+    sphere: Material
+    surface: Material
+
+    @property
+    def friction(self) -> float:
+        """Coefficient of static friction."""
+        return friction_between(*self)[0]
+
+    def stiffness(self, radius: float) -> float:
+        """Return Hertz's stiffness [N/m^1.5] of a sphere on a plane."""
+        return 4 / 3 * math.sqrt(radius) / sum((1 - one.poisson**2) / one.young for one in self)
+
+    def depth(self, force: float, radius: float) -> float:
+        """Return the depth [m] at which a force [N] holds a sphere."""
+        return float((force / self.stiffness(radius)) ** (2 / 3))
+
+    def bearable(self, radius: float) -> float:
+        """Return the load that presses a sphere in by a fifteenth of its radius."""
+        return float(self.stiffness(radius) * (radius / 15) ** 1.5)
+
+    def too_deep(self, force: float, radius: float) -> str:
+        """Say that a force presses a sphere too far in; "" if it does not."""
+        if self.depth(force, radius) <= 0.5 * radius:
+            return ""
+        ball = f"a {self.sphere.name} sphere of radius {mm(radius)}"
+        return f"{force:.3g} N would press {ball} in by more than half of it"
+
+    def sticking(self, radius: float, speed: float, load: float, mass: float) -> Contact:
+        """Return a contact whose friction sticks under a load, that of a `mass` [kg]."""
+        slope = 1.5 * self.stiffness(radius) ** (2 / 3) * load ** (1 / 3)
+        bristle = (rounded(slope), rounded(0.2 * math.sqrt(slope * mass)))
+        return Contact(self, speed, bristle=bristle)
+
+
+class Contact:
+    """Law and friction of a tip, as the scenario states them.
+
+    The first touch is at `speed` [m/s], at which the restitution holds; friction is full at the
+    slip speed `v_static` [m/s]. `bristle` is stiffness [N/m] and damping [N s/m] of bristles, for
+    what has to stand.
+    """
+
+    def __init__(
+        self,
+        materials: Materials,
+        speed: float,
+        v_static: float = 0.005,
+        bristle: tuple[float, float] | None = None,
+    ) -> None:
+        self.material, self.against = materials
+        self.restitution = restitution_between(*materials)
+        self.mu_static, self.mu_dynamic = (round(mu, 3) for mu in friction_between(*materials))
+        self.speed, self.v_static, self.bristle = rounded(speed), rounded(v_static), bristle
+        self.v_dynamic = rounded(10 * self.v_static)
+
+    @property
+    def note(self) -> str:
+        """Where the values are from."""
+        pair = f"{self.material.name} on {self.against.name}"
+        return f"law and friction of {pair}, typical values: --law and --against name others"
+
+
+def chosen_materials(asked: Asked, tips: Sequence[Tip], load: float) -> Materials:
+    """Return what sphere and surface are made of; `load` [kg] rests on each, 0: it falls."""
+    rubber = Materials(find_material("rubber"), find_material(asked.against or "steel"))
+    # A tip is of rubber, unless the mass behind it would press rubber in too far.
+    bears = rubber.bearable(min(tip.radius for tip in tips)) >= load * GRAVITY
+    name = asked.material or (("rubber" if bears else "plastic") if load else "steel")
+    return rubber._replace(sphere=find_material(name))
 
 
 @dataclass
@@ -76,7 +156,7 @@ class Press:
     weak: bool = False
     lead_in: float = 0.0
     calm: bool = False
-    repair: Literal["", "calmed", "cut", "stays"] = ""
+    repair: Literal["", "calmed", "cut", "stays", "slower"] = ""
     hollow: bool = False
 
     def __post_init__(self) -> None:
@@ -112,7 +192,7 @@ class Press:
         self.rotational_damping = rounded(2 * self.damped * math.sqrt(turning * stance.inertia))
         # The posture's pull may take a fiftieth of the normal force at the end of the path.
         pull = min(0.02 * force / (stance.mass * max(self.way.length, radius)), 100.0)
-        pull = pull if stance.joints > (6 if turning else 3) else 0.0
+        pull = pull if len(stance.joint_inertia) > (6 if turning else 3) else 0.0
         joints = stance.joint_inertia
         self.posture_stiffness = [] if self.calm else [rounded(pull * one) for one in joints]
         self.joint_damping = [rounded(0.7 * math.sqrt(pull) * one) for one in joints]
@@ -142,7 +222,8 @@ class Press:
         moving = way.length / self.speed + 2 * RAMP * corners
         duration = math.ceil(10 * (self.lead_in + (moving or 0.5) + 0.5)) / 10
         said = tuple(one for one in why if one)
-        return Plan((tip,), self.contact, self, duration, self.gap, place.placement, None, said)
+        control = self.contact, self, duration, self.gap
+        return Plan((tip,), *control, stance.q, lock, place.placement, said, weak=self.weak)
 
 
 @dataclass(frozen=True)
@@ -164,9 +245,10 @@ class Hold:
 class Plan:
     """A scenario before it is text.
 
-    `placement` is that of the shell in the world. A free root starts at `root` (7,): x y z and
-    quaternion x y z w; a free `part` there carries the shell. `why` has one sentence for each
-    choice that was made for the user. The tip number `strongest` presses most, and is checked.
+    The robot starts at q (nq,), without the joints to `lock`; the effort limits of motors that are
+    too `weak` are not modeled. `placement` is that of the shell in the world, or of a free `part`
+    that carries it; None: it stands as in its file. `why` has one sentence for each choice that was
+    made for the user. The tip number `strongest` presses most, and is checked.
     """
 
     tips: tuple[Tip, ...]
@@ -174,10 +256,12 @@ class Plan:
     control: Press | Hold | None
     duration: float
     gap: float
-    placement: pin.SE3
-    root: Array | None
+    q: Array
+    lock: tuple[str, ...]
+    placement: pin.SE3 | None = None
     why: tuple[str, ...] = ()
     part: Part | None = None
+    weak: bool = False
     strongest: int = 0
 
 

@@ -1,30 +1,38 @@
 """The search for a draft that works: directions to press in, places of the part, and repairs."""
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
-from sphshell_pin.scenario.drafting.asked_places import asked_touches
 from sphshell_pin.scenario.drafting.fingertips import other_ends
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
-from sphshell_pin.scenario.drafting.placing import Bench, Place, nearest_side
+from sphshell_pin.scenario.drafting.placing import STEEP, Bench, Place
 from sphshell_pin.scenario.drafting.plan import (
     TIP_GAP,
+    Plan,
     Press,
+    chosen_materials,
     press_force,
     press_gap,
 )
 from sphshell_pin.scenario.drafting.poses import Limb, approaches
-from sphshell_pin.scenario.drafting.searching import CannotReach, NewScenario, Search, coordinates
-from sphshell_pin.scenario.drafting.tip_contact import chosen_materials
-from sphshell_pin.scenario.drafting.touch_points import sides, touch_points
+from sphshell_pin.scenario.drafting.searching import CannotReach, Search
+from sphshell_pin.scenario.drafting.touch_points import (
+    TouchPoint,
+    asked_touches,
+    sides,
+    touch_points,
+)
 from sphshell_pin.scenario.drafting.trial import Fault
+from sphshell_pin.scenario.drafting.vectors import nearest_axis
 from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
 
@@ -50,7 +58,9 @@ _ADVICE = {
 
 def repaired(one: Press, fault: Fault) -> Press | None:
     """Return what to try in place of a draft that failed; None: nothing."""
-    if one.repair in ("stays", "cut"):
+    if one.repair == "stays" and fault.kind == "force" and 0.0 < fault.t < one.lead_in:
+        return replace(one, lead_in=2 * one.lead_in, repair="slower")
+    if one.repair in ("stays", "slower", "cut"):
         return None
     if fault.kind == "force" and not one.repair:
         return replace(one, calm=True, repair="calmed")
@@ -59,21 +69,8 @@ def repaired(one: Press, fault: Fault) -> Press | None:
     count = int((along < _CUT * one.speed * (fault.t - one.lead_in)).sum())
     if along[max(count - 1, 0)] < SHORTEST_PATH * one.place.stance.tip.radius:
         return None
-    return replace(
-        one, way=replace(one.way, points=one.way.points[:count], why=fault.text), repair="cut"
-    )
-
-
-def _still(one: Press, fault: Fault) -> list[Press]:
-    """Return what presses in one place, which a path may have failed.
-
-    It is tried if no path works anywhere.
-    """
-    if fault.kind == "links" and fault.t < one.lead_in:
-        return []
-    why = f"with a path {fault.text}" if one.slides else one.way.why
-    way = replace(one.way, points=one.way.points[:1], why=why)
-    return [replace(one, way=way, lead_in=_CALM_LEAD_IN, repair="stays")]
+    way = replace(one.way, points=one.way.points[:count], why=fault.text)
+    return replace(one, way=way, repair="cut")
 
 
 class PressSearch(Search):
@@ -90,24 +87,36 @@ class PressSearch(Search):
         known = WORKING.get(self.section.name or "", ())
         q = np.array(known) if len(known) == self.model.nq else self.q0
         self.limb = Limb(self.model, tip)
-        self.held = self.links(tips, self.limb.lock, q)
+        links = self.hold_links(tips, self.limb.lock, q)
         self.room = _ROOM * tip.radius
-        self.bench = Bench(self.held, self.limb, q, 2 * TIP_GAP * tip.radius)
-        self.errors: list[SphshellError] = []
+        self.bench = Bench(links, self.limb, q, 2 * TIP_GAP * tip.radius)
         self.even = False
         """Whether the sphere touched one face in some place that was tried."""
         self.stays: list[Press] = []
         """What presses in one place, where a path failed."""
-        self.ways: list[str] = []
-        """Why a path that was asked for could not be taken."""
+        self.refused: list[str] = []
+        """Why nothing that was asked for could be run."""
 
-    def find(self) -> NewScenario:
-        """Return the first draft that works; SphshellError if none does."""
-        for one in self._presses():
-            found = self._repaired(one)
-            if found is not None:
-                return found
-        raise self._refusal()
+    def drafts(self) -> Iterator[Plan]:
+        """Yield drafts, each with those that repair it."""
+        for press in self._presses():
+            one: Press | None = press
+            while one is not None and len(self.faults) < _MOST_RUNS:
+                yield one.plan()
+                one = self._next(press, one, self.faults[-1])
+
+    def _next(self, press: Press, failed: Press, fault: Fault) -> Press | None:
+        """Return what to run in place of what `failed`, a repair of `press`; None: nothing."""
+        early = fault.kind == "links" and fault.t < failed.lead_in
+        if not (failed.repair or self.asked.slides or early):
+            # It presses in one place if no path works anywhere.
+            why = f"with a path {fault.text}" if failed.slides else failed.way.why
+            way = replace(failed.way, points=failed.way.points[:1], why=why)
+            self.stays.append(replace(failed, way=way, lead_in=_CALM_LEAD_IN, repair="stays"))
+        if fault.cut and not failed.weak:
+            return replace(press, weak=True)
+        found = repaired(failed, fault)
+        return None if found and self.asked.slides and found.repair == "cut" else found
 
     def _presses(self) -> Iterator[Press]:
         """Yield what is tried: paths, then one place of those that failed, then other places."""
@@ -115,29 +124,25 @@ class PressSearch(Search):
         for one in self._everywhere():
             if one.slides:
                 yield one
-                if len(self.faults) >= _MOST_SLIDES:
-                    break
-                continue
-            # It presses there, if it slides nowhere.
-            still.append(one)
-            if len(still) >= _MOST_STILL:
+            else:
+                still.append(one)
+            if len(self.faults) >= _MOST_SLIDES or len(still) >= _MOST_STILL:
                 break
-        if self.asked.slides:
-            self.ways += [one.way.why for one in still]
-            still = []
-        yield from self.stays
-        yield from still
+        if not self.asked.slides:
+            yield from [*self.stays, *still]
+        elif still:
+            why = still[0].way.why
+            self.refused.append(f"the path cannot be taken: {why}; {_ADVICE['path']}")
 
     def _everywhere(self) -> Iterator[Press]:
         """Yield what presses in each place, with the longest path there."""
         asked, radius = self.asked, self.tip.radius
         for found in self._places():
-            stance = found.stance
-            pair = chosen_materials(asked, [self.tip], stance.mass)
+            stance, pair = found.stance, chosen_materials(asked, [self.tip], found.stance.mass)
             try:
                 force = press_force(stance, pair, asked.press)
             except SphshellError as error:  # of this posture: another one may do
-                self.errors.append(error)
+                self.refused.append(str(error))
                 continue
             self.even |= found.on_face
             gap = press_gap(radius, force, stance.mass, pair)
@@ -151,78 +156,52 @@ class PressSearch(Search):
 
         The tip presses down if nothing else is asked for, else as its limb points, else sideways.
         """
-        asked, shell, tip = self.asked, self.shell, self.tip
-        gap = TIP_GAP * tip.radius
-        directions = [PLACES[asked.place]] if asked.place else list(PLACES.values())
-        pressed = approaches(self.limb, self.bench.q, directions)
-        if asked.fixed:
-            spots = asked_touches(asked, shell, tip.radius, gap)
-            choices = [(nearest_side(spots[0].normal), spots)]
+        asked, shell, radius = self.asked, self.shell, self.tip.radius
+        gap, choices = TIP_GAP * radius, list[tuple[Array, list[TouchPoint]]]()
+        if asked.at is not None or isinstance(asked.path, np.ndarray):
+            spots = asked_touches(asked, shell, radius, gap)
+            axis, normal = nearest_axis(spots[0].normal), spots[0].normal
+            choices.append((axis if axis @ normal > STEEP else normal, spots))
         else:
-            side = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
-            choices = [
-                (one, list(touch_points(shell, tip.radius, gap, toward=one, inside=asked.inside)))
-                for one in (sides(shell) if side is None else [side])
-            ]
-        for approach in pressed[:1] if asked.place else pressed:
+            word = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
+            for side in sides(shell) if word is None else [word]:
+                spots = list(touch_points(shell, radius, gap, toward=side, inside=asked.inside))
+                choices.append((side, spots))
+        place = PLACES.get(asked.place or "")
+        for approach in [np.array(place)] if place else approaches(self.limb, self.bench.q):
             # Upright ones first, as they stand in their file.
             ordered = sorted(choices, key=lambda one: abs(one[0][2] + approach[2]) > 1e-3)
-            for room in (self.room, 0.0):
-                for side, some in ordered:
-                    for on_floor in (True, False):
-                        yield from self.bench.places(
-                            side, some, approach, on_floor=on_floor, room=room
-                        )
+            tries = itertools.product((self.room, 0.0), ordered, (True, False))
+            for room, (side, some), on_floor in tries:
+                yield from self.bench.places(side, some, approach, on_floor=on_floor, room=room)
 
-    def _repaired(self, press: Press) -> NewScenario | None:
-        """Run a draft, and those that repair it; return the first that works."""
-        one: Press | None = press
-        q = press.place.stance.q
-        home = coordinates(self.model, self.q0)
-        start = {k: at for k, at in coordinates(self.model, q).items() if at != home[k]}
-        while one is not None and len(self.faults) < _MOST_RUNS:
-            section = self.locked(self.limb.lock, "effort" if one.weak else "", start=start)
-            found = self.run(section, one.plan(), self.held)
-            if found is not None:
-                return found
-            fault = self.faults[-1]
-            if not one.repair and len(self.stays) < _MOST_STILL and not self.asked.slides:
-                self.stays += _still(one, fault)
-            if fault.cut and not one.weak:
-                one = replace(press, weak=True)
-                continue
-            one = repaired(one, fault)
-            one = None if one and self.asked.slides and one.repair == "cut" else one
-        return None
-
-    def _refusal(self) -> SphshellError:
+    def refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""
         place, bench, frame = self.asked.place, self.bench, self.tip.frame
+        ends = other_ends(self.model, frame)
         if not bench.postures:
             way = f"along {place}" if place else "along any axis"
-            return SphshellError(
-                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried: its "
-                "joints do not allow it; take another --place or --frame"
+            return CannotReach(
+                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried; its "
+                "joints do not allow it: take another --place or --frame",
+                frame,
+                ends,
             )
-        others = other_ends(self.model, frame)
+        ((link, _),) = bench.blocked.most_common(1) or [("", 0)]
         if self.faults:
             said = f"{self.failed()}; {_ADVICE[self.faults[-1].kind]}"
             # The force is held on faces, which links may have kept the tip from.
-            if self.even or not bench.blocked:
-                return SphshellError(said)
-            return CannotReach(said, frame, others, bench.out_of_limb())
-        if self.errors:
-            return self.errors[0]
-        if self.ways:
-            return SphshellError(f"the path cannot be taken: {self.ways[0]}; {_ADVICE['path']}")
-        if not bench.blocked:
-            return SphshellError("the surface has no point to touch")
-        ((link, _),) = bench.blocked.most_common(1)
-        return CannotReach(
-            f"link '{link}' would be in the part, or another one: in each of "
-            f"{counted(bench.postures, 'posture')} and {counted(bench.tried, 'place')} on the part "
-            f"that were tried; {_ADVICE['links']}",
-            frame,
-            others,
-            bench.out_of_limb(),
-        )
+            link = "" if self.even else link
+        elif self.refused:
+            said, link = self.refused[0], ""
+        elif link:
+            said = (
+                f"link '{link}' would be in the part, or another one: in each of "
+                f"{counted(bench.postures, 'posture')} and {counted(bench.tried, 'place')} on the "
+                f"part that were tried; {_ADVICE['links']}"
+            )
+        else:
+            said = "the surface has no point to touch"
+        if not link:
+            return SphshellError(said)
+        return CannotReach(said, frame, ends, bench.out_of_limb())

@@ -11,6 +11,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.robots import joints_without_mass
+from sphshell_pin.scenario.drafting.asked import PLACES
 from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
@@ -61,6 +62,11 @@ class Limb(Reach):
         moves = [self.jacobian(self.seed(neutral, rng))[:3] for _ in range(_LOOKED)]
         self.on_line = max(_rank(one) for one in moves) == 1
         """Whether all joints move the tip along one line, in any posture."""
+        every = np.hstack(moves)
+        ways = np.linalg.svd(every)[0][:, :2]
+        in_plane = not self.on_line and _rank(every) == 2
+        self.onto_ways = ways @ ways.T if in_plane else np.eye(3)
+        """Projects (3,) on where the tip moves, in some posture at least."""
 
     def direction(self) -> Array:
         """Return the unit vector (3,) along the limb to the tip, from what is in `data`.
@@ -71,10 +77,12 @@ class Limb(Reach):
         pose = self.data.oMf[self.frame]
         # A small ball on a flat end may be far beside the frame.
         way = self.tip.offset if self.tip.ahead is None else self.tip.ahead
-        if way.any():
-            return unit(pose.rotation @ way)
+        # A wheel's place on its axle is not where its leg points.
+        ahead = self.onto_ways @ pose.rotation @ way
+        if np.linalg.norm(ahead) > _BESIDE * np.linalg.norm(way):
+            return unit(ahead)
         for joint in reversed(self.chain):
-            away = pose.translation - self.data.oMi[joint].translation
+            away = self.onto_ways @ (pose.translation - self.data.oMi[joint].translation)
             if np.linalg.norm(away) > self.tip.radius:
                 return unit(away)
         return np.array([0.0, 0.0, -1.0])
@@ -138,8 +146,8 @@ class Stance:
         model, columns, jacobian = limb.model, limb.columns, limb.jacobian(q)
         linear, angular = jacobian[:3], jacobian[3:]
         self.center = limb.data.oMf[limb.frame].act(limb.offset)
-        away = [self.center - limb.data.oMi[j].translation for j in limb.chain]
-        self.reach = max((float(np.linalg.norm(one)) for one in away), default=0.0)
+        joints = np.reshape([limb.data.oMi[j].translation for j in limb.chain], (-1, 3))
+        self.reach = float(np.linalg.norm(self.center - joints, axis=1).max(initial=0.0))
         scaled = jacobian / np.repeat([max(self.reach, 1e-9), 1.0], 3)[:, None]
         values = np.linalg.svd(scaled, compute_uv=False)
         self.dexterity = float(values[-1] / values[0]) if values[0] > 0 else 0.0
@@ -183,17 +191,12 @@ class Stance:
         taken = np.where(stated, model.damping[columns] * rates / np.maximum(limits, 1e-9), 0.0)
         self.fastest = 0.5 / max(float(taken.max(initial=0.0)), 1e-9)
 
-    @property
-    def joints(self) -> int:
-        """How many coordinates move the tip."""
-        return len(self.limb.columns)
-
     def at(self, center: Array) -> Stance | None:
         """Return the stance nearby with the sphere's center at `center` (3,); None if it cannot."""
         if abs(center - self.center).max() < 1e-12:
             return self
         held = self._held_rotation()
-        q, off = self.limb.solve(self.q, center, turn=held if self.joints >= 6 else None)
+        q, off = self.limb.solve(self.q, center, turn=held if len(self.limb.columns) >= 6 else None)
         found = Stance(self.limb, q, self.approach)
         return None if off > _HEIGHT * self.reach or found.mobility < _MOBILE else found
 
@@ -236,15 +239,15 @@ class Stance:
         return lambda: np.asarray(pin.log3(start @ pose.rotation.T))
 
 
-def approaches(limb: Limb, q: Array, directions: Sequence[Sequence[float]]) -> list[Array]:
-    """Return where the tip may press, unit vectors (3,): the `directions` (k, 3) in turn.
+def approaches(limb: Limb, q: Array) -> list[Array]:
+    """Return where the tip may press, unit vectors (3,) along axes of the world.
 
-    After the first one, the axis of the world along which the limb that carries the tip points at
-    q.
+    Down first, then as the limb that carries the tip points at q.
     """
     limb.jacobian(q)
+    first, *others = PLACES.values()
     home = tuple(nearest_axis(limb.direction()))
-    return [np.array(one) for one in dict.fromkeys([*directions[:1], home, *directions[1:]])]
+    return [np.array(one) for one in dict.fromkeys([first, home, *others])]
 
 
 def stances(
@@ -260,15 +263,11 @@ def stances(
     rng = np.random.default_rng(0)
     rows = np.eye(3)[2:] if height is not None else np.zeros((0, 3))
     place = np.array([0.0, 0.0, height or 0.0])
-
-    def along() -> Array:
-        return turn_between(limb.direction(), approach)
-
+    turn = None if limb.on_line else lambda: turn_between(limb.direction(), approach)
     found: list[tuple[float, Stance]] = []
     start = limb.into_limits(q)
     for k in range(_SEEDS):
-        seed = limb.seed(start, rng) if k else start
-        at, off = limb.solve(seed, place, rows=rows, turn=None if limb.on_line else along)
+        at, off = limb.solve(limb.seed(start, rng) if k else start, place, rows=rows, turn=turn)
         away = [np.abs(pin.difference(limb.model, other.q, at)).max() for _, other in found]
         limb.jacobian(at)
         for one in [Stance(limb, at, way) for way in limb.pushes(approach)]:
@@ -276,19 +275,15 @@ def stances(
                 continue
             if min(away, default=np.inf) < _APART or not (one.can_yield() and usable(at)):
                 continue
-            ease = _ease(limb, at)
+            # 1 where all joints are away from their limits, less and less towards one.
+            room = np.minimum(at[limb.bounded] - limb.low, limb.high - at[limb.bounded])
+            ease = room / (limb.high - limb.low) / _AT_EASE
+            ease = float(np.clip(ease, 0.0, 1.0).min(initial=1.0))
             rank = one.mobility * one.ahead * ease * one.dexterity
             rank += k == 0 and min(one.mobility, one.dexterity, ease) > _EASY
             found.append((rank * (one.force > 0), one))
     found.sort(key=lambda one: -one[0])
     return [one for _, one in found[: _MOST * (len(_BETWEEN) if limb.on_line else 1)]]
-
-
-def _ease(limb: Limb, q: Array) -> float:
-    """Return 1 where all joints are away from their limits, less and less towards one."""
-    at = q[limb.bounded]
-    room = np.minimum(at - limb.low, limb.high - at) / (limb.high - limb.low)
-    return float(np.clip(room / _AT_EASE, 0.0, 1.0).min(initial=1.0))
 
 
 def _rank(linear: Array) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -23,7 +23,6 @@ from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario
-from sphshell_pin.scenario.format.schema import RobotSection
 from sphshell_pin.scenario.format.sliders import check_knobs
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ class CannotStand(SphshellError):
 
 
 class CannotReach(SphshellError):
-    """The links of a limb would be in the part wherever its tip, on `frame`, touches that.
+    """The tip of a limb, on `frame`, cannot press, or links would be in the part wherever it does.
 
     `others` are frames at the ends of other limbs, `out` is a tip farther out of the limb.
     """
@@ -78,7 +77,6 @@ class Search(ABC):
         self.faults: list[Fault] = []
         """What failed in each draft that was run."""
 
-    @abstractmethod
     def find(self) -> NewScenario:
         """Return the first draft that works.
 
@@ -87,35 +85,51 @@ class Search(ABC):
         SphshellError
             None does; the text says what fails and what to change.
         """
+        for plan in self.drafts():
+            made = self._run(plan)
+            if made is not None:
+                return made
+        raise self.refusal()
 
-    def links(self, tips: Sequence[Tip], lock: Sequence[str], q: Array | None = None) -> Links:
-        """Return the robot's links, to be held against the surface."""
+    @abstractmethod
+    def drafts(self) -> Iterator[Plan]:
+        """Yield what is run next: the last of `faults` says what failed in the last draft."""
+
+    @abstractmethod
+    def refusal(self) -> SphshellError:
+        """Return the error that says why no draft works, and what to change."""
+
+    def hold_links(self, tips: Sequence[Tip], lock: Sequence[str], q: Array | None = None) -> Links:
+        """Have the robot's links held against the surface."""
         geometry = self.built.assembly.loaded[0].collision_model
-        return Links(self.model, geometry, self.shell, tips, lock, q)
+        self.held = Links(self.model, geometry, self.shell, tips, lock, q)
+        return self.held
 
-    def locked(self, lock: Sequence[str], leave: str = "", **stated: object) -> RobotSection:
-        """Return the robot's table with joints locked, and what else is stated.
-
-        What the model states of the joints that move is modeled, without a kind to `leave` out.
-        """
-        found = JointComponents.from_model(self.model).without(lock).kinds()
-        kinds = [kind for kind in found if kind != leave]
-        return self.section.model_copy(update={"lock": list(lock), "joints": kinds, **stated})
-
-    def run(self, section: RobotSection, plan: Plan, links: Links) -> NewScenario | None:
+    def _run(self, plan: Plan) -> NewScenario | None:
         """Write a draft and run it; None where it fails, as the last of the `faults` says."""
         loaded, (shell,) = self.built.assembly.loaded[0], self.built.scenario.shell
         does = "holds" if plan.part else _DOES[type(plan.control)]
         title = f"{loaded.name} {does} {shell.name}"
         if loaded.assumed:
-            title += f", its missing inertias from its geometry at {section.density:g} kg/m^3"
+            title += f", its missing inertias from its geometry at {self.section.density:g} kg/m^3"
+        # What the model states of the joints that move is modeled.
+        kinds = JointComponents.from_model(self.model).without(plan.lock).kinds()
+        home, at = coordinates(self.model, self.q0), coordinates(self.model, plan.q)
+        section = self.section.model_copy(
+            update={
+                "lock": list(plan.lock),
+                "joints": [kind for kind in kinds if kind != "effort" or not plan.weak],
+                "start": {name: at[name] for name in at if at[name] != home[name]},
+                "label": "hand" if plan.part else None,
+            }
+        )
         text = draft_text(self.file.stem, title, section, shell, plan)
         scenario = parse_scenario(text, self.file)
         check_knobs(scenario, self.file, ranges=True)
         known = plan.part.beside(self.built, self.file.stem) if plan.part else self.built
         try:
             built = build_scenario(scenario, self.file, known)
-            fault = try_out(built, plan, links)
+            fault = try_out(built, plan, self.held)
         except SphshellError as error:
             fault = Fault("run", str(error))
         if fault is None:

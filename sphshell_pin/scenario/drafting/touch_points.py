@@ -1,19 +1,20 @@
-"""A place to touch on any surface: its broad side, away from holes, and a path on it."""
+"""A place to touch on any surface, as asked or on its broad side, and a path on it."""
 
-from __future__ import annotations
-
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.errors import SphshellError
+from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, tangents, unit
-
-if TYPE_CHECKING:
-    from sphshell_pin.shell.shell import Shell
-
+from sphshell_pin.scenario.drafting.wording import listed
+from sphshell_pin.shell.faces import Face, described
+from sphshell_pin.shell.raw import KINDS
+from sphshell_pin.shell.shell import Shell
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
 _SHARP_ANGLE = np.deg2rad(35.0)
@@ -27,8 +28,13 @@ _SHEET = 0.3
 _SAMPLES, _MOST_PLACES, _APART, _FACING = 200, 16, 0.05, 0.5
 # Points at the end of a path that are left out, so that it ends before a rim and not on it.
 _SPARE = 2
-# Directions in which a path is tried when the asked one is too short.
-_DIRECTIONS = 8
+# Directions in which a path is tried when the asked one is too short [rad].
+_ANGLES = tuple(np.deg2rad((0, 180, 45, -135, -45, 135, 90, -90)))
+# How far the sphere may touch beside the place asked for, in radii, and a point be from the
+# surface, as a part of its size; radii of faces that are alike, as a part of them.
+_BESIDE, _OFF, _ALIKE = 0.25, 0.02, 0.01
+# Faces that are tried.
+_MOST_FACES = 20
 
 
 @dataclass(frozen=True)
@@ -49,18 +55,23 @@ def find_touch_point(
     radius: float,
     gap: float,
     *,
-    toward: Array | None = None,
+    toward: Array,
     inside: bool = False,
-    beside: Array | None = None,
+    beside: Array | float = 0.0,
 ) -> TouchPoint:
     """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
-    `toward` (3,) is the side to touch from, by default the first one of `sides`. With `inside` the
-    surface is touched from its middle. `beside` (3,) [m] moves the place away from the middle.
+    It is touched from the side `toward` (3,), with `inside` from its middle. `beside` (3,) [m]
+    moves the place away from the middle.
     """
-    middle = shell.box.mean(axis=0) + (0.0 if beside is None else beside)
-    axis = sides(shell)[0] if toward is None else np.asarray(toward, dtype=float)
-    return come_down(shell, middle if inside else _above(shell, axis, middle), -axis, radius, gap)
+    start = shell.box.mean(axis=0) + beside
+    if not inside:
+        # Far out above the middle or, over a hole, beside it.
+        start = start + 2 * shell.size * toward
+        if not _advance(shell, start, -toward, 0.0, 1e-6 * shell.size)[2]:
+            near = shell.closest_points(start[None]).points[0]
+            start = near + toward * (toward @ (start - near))
+    return come_down(shell, start, -toward, radius, gap)
 
 
 def sides(shell: Shell) -> list[Array]:
@@ -72,8 +83,7 @@ def sides(shell: Shell) -> list[Array]:
     outward = _bulge(shell)
     if outward is not None:
         return [nearest_axis(outward)]
-    sizes = shell.box[1] - shell.box[0]
-    broad = [float(np.prod(np.delete(sizes, k))) for k in range(3)]
+    broad = [float(np.prod(np.delete(np.ptp(shell.box, axis=0), k))) for k in range(3)]
     axes = [sign * np.eye(3)[k] for sign in (1.0, -1.0) for k in (2, 1, 0)]
 
     def rank(axis: Array) -> tuple[bool, float]:
@@ -87,25 +97,29 @@ def touch_points(
     shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
 ) -> Iterator[TouchPoint]:
     """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
-    middle = shell.box.mean(axis=0)
-    for point in (middle, *_roomy_places(shell, -toward if inside else toward)[0]):
+    middle, facing = shell.box.mean(axis=0), _facing(shell, -toward if inside else toward)
+    for point in (middle, *roomy_places(shell, facing)[0]):
         beside = point - middle - toward * (toward @ (point - middle))
         yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
 
 
 def widest_room(shell: Shell) -> float:
     """Return the largest distance [m] of a place from where the surface ends, or turns sharply."""
-    return max(_roomy_places(shell, side)[1] for side in sides(shell))
+    return max(roomy_places(shell, _facing(shell, side))[1] for side in sides(shell))
 
 
-def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
-    """Return points (3,) apart from each other on what faces `toward`, the best one first.
+def _facing(shell: Shell, toward: Array) -> NDArray[np.bool_]:
+    """Return which facets (n,) face `toward` (3,)."""
+    return np.asarray(shell.triangle_normals @ toward > _FACING)
+
+
+def roomy_places(shell: Shell, facets: NDArray[np.bool_]) -> tuple[list[Array], float]:
+    """Return points (3,) apart from each other on some `facets` (n,), the best one first.
 
     The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
     corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
-    normals, areas = shell.triangle_normals, facet_areas(shell)
-    facing = np.flatnonzero(normals @ toward > _FACING)
+    normals, areas, facing = shell.triangle_normals, facet_areas(shell), np.flatnonzero(facets)
     if not len(facing):
         return [], 0.0
     ends = np.sort(shell.triangles[facing][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -114,10 +128,8 @@ def _roomy_places(shell: Shell, toward: Array) -> tuple[list[Array], float]:
     total = np.zeros((len(ends), 3))
     np.add.at(total, owner.ravel(), np.repeat(normals[facing], 3, axis=0))
     sharp = (count != 2) | (np.linalg.norm(total, axis=1) < 2 * np.cos(0.5 * _SHARP_ANGLE))
-    start, along = (
-        shell.vertices[ends[sharp, 0]],
-        np.diff(shell.vertices[ends[sharp]], axis=1)[:, 0],
-    )
+    start, end = np.moveaxis(shell.vertices[ends[sharp]], 1, 0)
+    along = end - start
     some = rng.choice(facing, _SAMPLES, p=areas[facing] / areas[facing].sum())
     points = np.einsum("ij,ijk->ik", rng.dirichlet(np.ones(3), _SAMPLES), corners[some])
     room = np.full(_SAMPLES, np.inf)
@@ -169,9 +181,7 @@ def paths_on_surface(
     """
     first, second = tangents(place.normal, direction)
     steps = max(1, round(length / spacing))
-    for k in range(_DIRECTIONS):
-        # 0, 180, +45, -135, -45, ... degrees: near the asked direction first.
-        angle = np.pi / 4 * ((k // 2 + 1) // 2) * (1 if k // 2 % 2 else -1) + np.pi * (k % 2)
+    for angle in _ANGLES:
         ahead = np.cos(angle) * first + np.sin(angle) * second
         yield _walk(shell, place, ahead, steps, spacing)
 
@@ -186,9 +196,7 @@ def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing
         if turned @ normal < _SHARPEST or moved @ direction < 0.7 * spacing:
             break
         points.append(point)
-        normal = turned
-        ahead = moved - normal * (normal @ moved)
-        direction = unit(ahead)
+        normal, direction = turned, unit(moved - turned * (turned @ moved))
     return np.array(points[: max(1, len(points) - _SPARE)])
 
 
@@ -210,19 +218,14 @@ def _bulge(shell: Shell) -> Array | None:
     heights = shell.vertices @ normal
     middle = shell.closest_points(shell.box.mean(axis=0)[None]).points[0] @ normal
     # The box of a dome is around its hollow.
-    bulge = float(middle - 0.5 * (heights.max() + heights.min()))
-    if abs(bulge) < 1e-6 * shell.size:
-        bulge = float(normal @ np.array([1e-6, 1e-3, 1.0]))
+    bulge = side_of_sheet(shell, normal, middle - 0.5 * (heights.max() + heights.min()))
     return normal if bulge >= 0 else -normal
 
 
-def _above(shell: Shell, axis: Array, middle: Array) -> Array:
-    """Return a place far out along `axis`, above the middle or, over a hole, beside it."""
-    far = middle + 2 * shell.size * axis
-    if not _advance(shell, far, -axis, 0.0, 1e-6 * shell.size)[2]:
-        beside = shell.closest_points(far[None]).points[0]
-        far = beside + axis * (axis @ (far - beside))
-    return far
+def side_of_sheet(shell: Shell, normal: Array, height: float) -> float:
+    """Return the `height` [m] that says whether `normal` (3,) points out; up of what is flat."""
+    flat = abs(height) < 1e-6 * shell.size
+    return float(normal @ np.array([1e-6, 1e-3, 1.0]) if flat else height)
 
 
 def come_down(
@@ -255,3 +258,84 @@ def _advance(
             break
         place = place + free * direction
     return place, point, False
+
+
+def asked_touches(asked: Asked, shell: Shell, radius: float, gap: float) -> list[TouchPoint]:
+    """Return where the sphere can touch as asked; SphshellError if nowhere."""
+    if isinstance(asked.at, str):
+        return _on_face(shell, asked.at, radius, gap)
+    point = asked.at if asked.at is not None else np.asarray(asked.path)[0]
+    off = float(np.abs(shell.closest_points(point[None]).distances[0]))
+    if off > _OFF * shell.size:
+        raise SphshellError(
+            f"the place {listed(point)} is {1e3 * off:.3g} mm off the surface, which is in "
+            f"the box from {listed(shell.box[0])} to {listed(shell.box[1])} m: state it in "
+            "the part's own coordinates, in meters"
+        )
+    spot = touch_from_outside(shell, point, radius, gap)
+    beside = float(np.linalg.norm(spot.point - point)) - off
+    if beside > _BESIDE * radius:
+        raise SphshellError(
+            f"a sphere of radius {1e3 * radius:.3g} mm does not come to {listed(point)}: it "
+            f"touches the part {1e3 * beside:.3g} mm beside it; take a smaller --radius or "
+            "another --at"
+        )
+    return [spot]
+
+
+def touch_from_outside(shell: Shell, point: Array, radius: float, gap: float) -> TouchPoint:
+    """Return where a sphere comes down on the surface at `point` (3,), from outside."""
+    near = shell.closest_points(point[None])
+    on, normal = near.points[0], near.normals[0]
+    aside = on + 1e-3 * radius * normal
+    if shell.is_closed:
+        outward = float(shell.closest_points(aside[None], method="facets").distances[0])
+        outward = -outward if shell.side == "inside" else outward
+    else:
+        # An open part is around its middle.
+        outward = side_of_sheet(shell, normal, (on - shell.box.mean(axis=0)) @ normal)
+    normal = normal if outward >= 0 else -normal
+    return come_down(shell, on + (1.5 * radius + gap) * normal, -normal, radius, gap)
+
+
+def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPoint]:
+    """Return touch points on the faces that `text` describes, the largest face first."""
+    faces, areas = _described_faces(shell, text), facet_areas(shell)
+    masks = [np.isin(shell.triangle_element, face.elements) for face in faces]
+    heights = shell.vertices[shell.triangles, 2].max(axis=1)
+    # The upper one of faces alike.
+    masks.sort(key=lambda on: (float(f"{-areas[on].sum():.3g}"), -float(heights[on].max())))
+    for on in masks[:_MOST_FACES]:
+        places = shell.closest_points(np.array(roomy_places(shell, on)[0])).points
+        spots = [touch_from_outside(shell, place, radius, gap) for place in places]
+        away = np.linalg.norm([spot.point for spot in spots] - places, axis=1)
+        if (away <= _BESIDE * radius).any():
+            return [spots[k] for k in np.flatnonzero(away <= _BESIDE * radius)]
+    raise SphshellError(
+        f"a sphere of radius {1e3 * radius:.3g} mm touches none of the {len(faces)} faces "
+        f"'{text}': it does not fit, or touches others first; take a smaller --radius or another "
+        "--at"
+    )
+
+
+def _described_faces(shell: Shell, text: str) -> list[Face]:
+    """Return the faces that `text` describes as `check` lists them: a kind, and its radius."""
+    words = re.fullmatch(r"([a-z]+)((?:of|radius|and|mm|[\s\d.eE+-])*)", text.strip())
+    name = words[1].replace("tori", "torus") if words else ""
+    kind = next((one for one in KINDS if name in (one, f"{one}s")), "")
+    lengths = f"the faces of this part: {described(shell.faces, shell.num_elements)}"
+    if words is None or not kind:
+        raise SphshellError(
+            f"no face '{text}': give x,y,z [m], or one of {', '.join(KINDS)} with its radius, as "
+            f"'cylinder 5.5 mm'; {lengths}"
+        )
+    asked = [float(one) for one in re.findall(r"[\d.]+(?:[eE][+-]?\d+)?", words[2])]
+    found = list[Face]()
+    for face in shell.faces:
+        radii = [1e3 * r for r in (face.radius, face.minor_radius) if r is not None]
+        alike = [abs(r / one - 1) < _ALIKE for r, one in zip(radii, asked, strict=False)]
+        if face.kind == kind and all(alike):
+            found.append(face)
+    if not found:
+        raise SphshellError(f"the part has no face '{text}'; {lengths}")
+    return found

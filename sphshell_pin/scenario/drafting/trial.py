@@ -1,6 +1,7 @@
 """A draft of a scenario, tried: it touches, holds its force, and keeps links off the part."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,8 +11,8 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.draft_text import HELD
+from sphshell_pin.scenario.drafting.part import GRAVITY
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
-from sphshell_pin.scenario.drafting.tip_contact import GRAVITY
 from sphshell_pin.scenario.drafting.vectors import unit
 from sphshell_pin.scenario.format.bodies import joint_spans, to_se3
 from sphshell_pin.scenario.format.build import Built
@@ -53,52 +54,38 @@ def try_out(built: Built, plan: Plan, links: Links) -> Fault | None:
     result, stopped = simulate(built)
     if stopped is not None:
         return Fault("run", f"the run stops: {stopped}")
-    fault = (
-        _touch_fault(plan, result)
-        or _link_fault(built, plan, result, links)
-        or _force_fault(built, plan, result)
-        or _path_fault(built, plan, result)
-        or _part_fault(built, plan, result)
-        or figure_fault(built, result)
-    )
     cut = any(one.cut_time for one in result.stats.joints.values())
-    return None if fault is None else replace(fault, cut=cut)
+    return next((replace(one, cut=cut) for one in _faults(built, plan, result, links)), None)
 
 
-def _touch_fault(plan: Plan, result: Result) -> Fault | None:
+def _faults(built: Built, plan: Plan, result: Result, links: Links) -> Iterator[Fault]:
     times = {name: one.contact_time for name, one in result.stats.pairs.items()}
     least = min(times, key=times.__getitem__)
     if plan.part and times[least] < _HELD * plan.duration:
-        return Fault("touch", f"'{least}' loses the part")
+        yield Fault("touch", f"'{least}' loses the part")
     if isinstance(plan.control, Hold) and len(times) == 2 and not times[least]:
-        return Fault("touch", f"'{least}' comes down beside the surface")
-    return None if any(times.values()) else Fault("touch", "the sphere never touches the surface")
-
-
-def _part_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
-    """Say how far a part moves in the fingers that have closed on it, if it does."""
-    if plan.part is None:
-        return None
-    span, _ = joint_spans(built.scene.model, "part/root_joint")
-    held = result.q[result.t >= _CLOSED * plan.duration][:, span][:, :3]
-    moved = float(np.linalg.norm(held - held[0], axis=1).max())
-    if moved <= _MOVED * min(tip.radius for tip in plan.tips):
-        return None
-    return Fault("path", f"the part moves by {1e3 * moved:.2g} mm in the hand")
-
-
-def _link_fault(built: Built, plan: Plan, result: Result, links: Links) -> Fault | None:
+        yield Fault("touch", f"'{least}' comes down beside the surface")
+    if not any(times.values()):
+        yield Fault("touch", "the sphere never touches the surface")
+    root = joint_spans(built.scene.model, "part/root_joint")[0] if plan.part else slice(0)
     placement = to_se3(built.scenario.shell[0].placement)
-    some = slice(None, None, -(-len(result.t) // _MOST_ROWS))
-    for k, (t, q) in enumerate(zip(result.t[some], result.q[some], strict=True)):
-        if plan.part:
-            span, _ = joint_spans(built.scene.model, "part/root_joint")
-            placement = pin.XYZQUATToSE3(q[span])
-        whole = whole_posture(built, q, links.model)
-        found = links.within(whole, placement, whole=k == 0)
+    for k in range(0, len(result.t), -(-len(result.t) // _MOST_ROWS)):
+        q = result.q[k]
+        placement = pin.XYZQUATToSE3(q[root]) if plan.part else placement
+        found = links.within(whole_posture(built, q, links.model), placement, whole=k == 0)
         if found is not None:
-            return Fault("links", f"link '{found}' is in the part", float(t), found)
-    return None
+            yield Fault("links", f"link '{found}' is in the part", float(result.t[k]), found)
+    if fault := _force_fault(built, plan, result) or _path_fault(built, plan, result):
+        yield fault
+    if plan.part:
+        # The fingers have closed on it by then.
+        held = result.q[result.t >= _CLOSED * plan.duration][:, root][:, :3]
+        away = float(np.linalg.norm(held - held[0], axis=1).max())
+        if away > _MOVED * min(tip.radius for tip in plan.tips):
+            yield Fault("path", f"the part moves by {1e3 * away:.2g} mm in the hand")
+    for one in judge(built, result):
+        if not one.met:
+            yield Fault("figure", f"{one.figure} is {one.measured:.3g}, not {one.expected}")
 
 
 def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
@@ -110,11 +97,9 @@ def _path_fault(built: Built, plan: Plan, result: Result) -> Fault | None:
     reach = Reach(built.scene.model, tip.frame, tip.offset)
     away = pair.shells[0].placement.actInv(reach.center(result.q[-1])) - control.path[-1]
     behind = math.sqrt(max(float(away @ away) - tip.radius**2, 0.0))
-    if behind < _BEHIND * tip.radius:
-        return None
-    reached = control.way.length - behind
+    when = control.lead_in + (control.way.length - behind) / control.speed
     said = f"the tip stays {1e3 * behind:.2g} mm behind the end of its path"
-    return Fault("path", said, control.lead_in + reached / control.speed)
+    return Fault("path", said, when) if behind >= _BEHIND * tip.radius else None
 
 
 def whole_posture(built: Built, q: Array, model: pin.Model) -> Array:
@@ -165,11 +150,3 @@ def _forces(result: Result) -> Array:
     np.add.at(normal, log.row, pushes)
     np.add.at(total, log.row, pushes + log.friction_force_world)
     return np.asarray(np.einsum("ij,ij->i", unit(normal), total))
-
-
-def figure_fault(built: Built, result: Result) -> Fault | None:
-    """Say which of the scenario's expected figures is not met, if one is not."""
-    for one in judge(built, result):
-        if not one.met:
-            return Fault("figure", f"{one.figure} is {one.measured:.3g}, not {one.expected}")
-    return None

@@ -13,6 +13,7 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array, Ints
+from sphshell_pin.shell.primitives import coal_tree
 from sphshell_pin.study.report.contents import (
     TIME_COLUMNS,
     Finding,
@@ -38,16 +39,6 @@ OURS, FLAT, COAL = "smooth", "facets", "coal::collide"
 TEXT = about(__doc__)
 Times = dict[tuple[str, int], Array]
 """Times of a query [s] (rounds,) by the code and the number of triangles."""
-
-
-def coal_tree(vertices: Array, triangles: Ints) -> coal.BVHModelOBBRSS:
-    """Return Coal's tree of a mesh."""
-    tree = coal.BVHModelOBBRSS()
-    tree.beginModel(len(triangles), len(vertices))
-    tree.addVertices(vertices)
-    tree.addTriangles(triangles.astype(np.uint32))
-    tree.endModel()
-    return tree
 
 
 def coal_contestant(vertices: Array, triangles: Ints, centers: Array) -> Callable[[], float]:
