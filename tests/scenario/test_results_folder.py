@@ -8,7 +8,6 @@ import shutil
 import signal
 import stat
 import time
-from unittest.mock import Mock
 
 import pytest
 
@@ -25,7 +24,7 @@ LAST = "summary.json"
 
 def put(folder, text, last=LAST):
     """Write a results folder of two files, and return what is in it."""
-    with AtomicFolder(folder, last=last) as place:
+    with AtomicFolder(folder, last=last, inner=["stopped"]) as place:
         staging = place.staging()
         for name in ("a", last):
             (staging / name).write_text(text)
@@ -110,15 +109,18 @@ def test_files_of_others_stay_the_same_files(tmp_path):
 def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
     out = tmp_path / "out"
     put(out, "old")
+    (out / "notes.txt").write_text("first")
 
     def late(one, other):
         (out / "late.txt").write_text("late")
+        (out / "aside").write_text("second")
+        os.replace(out / "aside", out / "notes.txt")
         exchange(one, other)
 
     monkeypatch.setattr("sphshell_pin.base.atomic.files.exchange", late)
     put(out, "new")
     assert (out / "late.txt").read_text() == "late"
-    assert os.listdir(tmp_path) == ["out"]
+    assert (out / "notes.txt").read_text() == "second"
 
 
 def never_exchanged(monkeypatch):
@@ -127,25 +129,23 @@ def never_exchanged(monkeypatch):
     )
 
 
-@pytest.mark.parametrize("why", ["working directory", "mount point", "files of others", "system"])
+@pytest.mark.parametrize("why", ["working directory", "mount point", "folders of others"])
 def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkeypatch):
     out = tmp_path / "out"
     put(out, "old")
     (out / "b").write_text("old")
     never_exchanged(monkeypatch)
-    if why == "system":
-        unknown = OSError(errno.ENOSYS, "Function not implemented")
-        monkeypatch.setattr("sphshell_pin.base.atomic.files.exchange", Mock(side_effect=unknown))
-    elif why == "working directory":
+    if why == "working directory":
         monkeypatch.chdir(out)
     elif why == "mount point":
         monkeypatch.setattr(os.path, "ismount", lambda path: path == out)
     else:
-        (out / "notes.txt").write_text("mine")
+        (out / "mine").mkdir()
+        (out / "mine" / "notes.txt").write_text("mine")
     before = os.stat(out).st_ino
-    others = {"notes.txt": "mine"} if why == "files of others" else {}
-    assert put(out, "new") == {"a": "new", LAST: "new"} | others
+    assert put(out, "new") == {"a": "new", LAST: "new"}
     assert os.stat(out).st_ino == before
+    assert why != "folders of others" or (out / "mine" / "notes.txt").read_text() == "mine"
     assert os.listdir(tmp_path) == ["out"]
 
 

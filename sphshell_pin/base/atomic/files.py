@@ -64,6 +64,8 @@ class AtomicFolder:
     path : of the folder; of a symbolic link its target is meant.
     last : name of the file that says that the others are complete. Where files are replaced one by
         one, it is removed first and written last.
+    inner : names of subfolders whose files are linked, too. A folder with any other subfolder is
+        not exchanged: it may be large, or a working directory.
 
     Raises
     ------
@@ -73,9 +75,10 @@ class AtomicFolder:
         It cannot be made or written.
     """
 
-    def __init__(self, path: str | PathLike[str], *, last: str) -> None:
+    def __init__(self, path: str | PathLike[str], *, last: str, inner: Sequence[str] = ()) -> None:
         self._folder = Path(os.path.realpath(path))
         self._last = last
+        self._inner = frozenset(inner)
         self._made: list[Path] = []
         self._lock: tuple[Path, int] | None = None
         # Without a lock it is unknown whether another process has ended: its files are left alone.
@@ -88,6 +91,10 @@ class AtomicFolder:
             with tempfile.TemporaryFile(dir=folder):
                 pass
             self._clear()
+            for name in self._inner:
+                if any(folder.glob(f".{name}.*")):  # what a process left that was writing there
+                    with AtomicFolder(folder / name, last=self._last):
+                        pass
         except BaseException:
             self._end()
             raise
@@ -136,11 +143,11 @@ class AtomicFolder:
     def replace(self, staging: Path, old: Iterable[str]) -> None:
         """Replace the files called `old` by all files of the `staging`; other files stay.
 
-        A reader sees all old files or all new ones at any time, unless the folder cannot be
-        exchanged: one with files of others, a mount point, the working directory, a folder whose
-        parent cannot be written, or one on a file system without the exchange of names. There the
-        files are replaced one by one, and `last` is missing meanwhile, for ever if the process is
-        killed then.
+        A reader sees all old files or all new ones at any time, and every other file, unless the
+        folder cannot be exchanged: a mount point, the working directory, a folder whose parent
+        cannot be written, one with subfolders, or one on a file system without the exchange of
+        names or without hard links. There the files are replaced one by one, and `last` is missing
+        meanwhile, for ever if the process is killed then.
 
         Raises
         ------
@@ -157,28 +164,20 @@ class AtomicFolder:
         for name in new:
             sync_file(staging / name)
         with interrupts_delayed():
-            if staging.parent == self._folder or not self._exchange(staging, ours):
+            if staging.parent != self._folder and self._exchange(staging, ours):
+                _bring_back(staging, self._folder, ours)
+                sync_folder(self._folder.parent)
+            else:
                 self._move_in(staging, new, ours)
 
     def _exchange(self, staging: Path, ours: set[str]) -> bool:
-        """Exchange the two folders; whether that was possible."""
+        """Exchange the two folders, the files of others in both; whether that was possible."""
         try:
-            if not ours.issuperset(os.listdir(self._folder)):
-                return False
-            about = os.stat(self._folder)
-            os.chown(staging, about.st_uid, about.st_gid)
-            shutil.copystat(self._folder, staging)
+            self._link_others(self._folder, staging, ours)
             sync_folder(staging)
             exchange(staging, self._folder)
         except OSError:
             return False
-        for name in os.listdir(staging):
-            if name in ours:
-                os.unlink(staging / name)
-            else:  # others wrote it until the moment of the exchange
-                os.rename(staging / name, self._folder / name)
-        os.rmdir(staging)
-        sync_folder(self._folder.parent)
         return True
 
     def _move_in(self, staging: Path, new: Sequence[str], ours: set[str]) -> None:
@@ -279,6 +278,24 @@ class AtomicFolder:
             if _is_left(place):
                 shutil.rmtree(place)
 
+    def _link_others(self, source: Path, target: Path, ours: set[str]) -> None:
+        """Link all files of `source` but `ours` into `target`, which becomes like it."""
+        about = os.stat(source)
+        os.chown(target, about.st_uid, about.st_gid)
+        shutil.copystat(source, target)
+        for entry in os.scandir(source):
+            if entry.name in ours:
+                continue
+            copy = target / entry.name
+            if not entry.is_dir(follow_symlinks=False):
+                os.link(entry, copy, follow_symlinks=False)
+            elif source == self._folder and entry.name in self._inner:
+                copy.mkdir()
+                self._link_others(Path(entry), copy, set())
+                sync_folder(copy)
+            else:
+                raise OSError(f"{entry.path} is a folder of others")
+
 
 def _is_left(place: Path) -> bool:
     """Whether a process of this user left a folder there, not somebody else in a shared folder."""
@@ -289,12 +306,40 @@ def _is_left(place: Path) -> bool:
     return stat.S_ISDIR(about.st_mode) and about.st_uid == os.geteuid()
 
 
+def _bring_back(left: Path, folder: Path, ours: set[str]) -> None:
+    """Remove the folder `left`; what in it is not `ours`, nor in `folder`, moves there.
+
+    Others may have written into it until the moment of the exchange.
+    """
+    for entry in list(os.scandir(left)):
+        there = folder / entry.name
+        if entry.name in ours:
+            os.unlink(entry)
+        elif entry.is_dir(follow_symlinks=False) and there.is_dir():
+            _bring_back(Path(entry), there, set())
+        elif _is_older(entry, there):
+            os.unlink(entry)
+        else:
+            os.rename(entry, there)
+    os.rmdir(left)
+
+
+def _is_older(entry: os.DirEntry[str], there: Path) -> bool:
+    """Whether the file is also `there`, the same or a newer one."""
+    try:
+        found = os.lstat(there)
+    except FileNotFoundError:
+        return False
+    mine = entry.stat(follow_symlinks=False)
+    return os.path.samestat(mine, found) or mine.st_mtime_ns <= found.st_mtime_ns
+
+
 @contextlib.contextmanager
-def held_folder(folder: Path, last: str) -> Iterator[AtomicFolder]:
+def held_folder(folder: Path, last: str, inner: Sequence[str] = ()) -> Iterator[AtomicFolder]:
     """Hold a folder, see `AtomicFolder`; ResultError where it cannot be, or another has it."""
     with contextlib.ExitStack() as held:
         try:
-            place = held.enter_context(AtomicFolder(folder, last=last))
+            place = held.enter_context(AtomicFolder(folder, last=last, inner=inner))
         except FolderInUse as busy:
             advice = "wait until it ends, or give another folder with --out"
             raise ResultError(folder, f"{busy}: {advice}") from None

@@ -106,14 +106,14 @@ def run_built(
     check_expectations(built)
     folder = Path("results") / built.name if out is None else Path(out)
     with contextlib.ExitStack() as held:
-        place = held.enter_context(held_folder(folder, SUMMARY))
+        place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
             folder = folder / STOPPED
-            place = held.enter_context(held_folder(folder, SUMMARY))
+            place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
         try:
             staging = place.staging()
             result.save(staging / "run.npz", home=folder)
