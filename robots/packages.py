@@ -68,6 +68,7 @@ class Folders:
         """Return the file that a description calls `uri`, or None: package://, file://, a path."""
         if self.kept is not None:
             return self.kept.get(uri)
+        uri = uri.replace("\\", "/")  # of Windows
         scheme, colon, rest = uri.partition("://")
         if colon and scheme in ("package", "model"):
             name, _, inner = rest.partition("/")
@@ -105,6 +106,18 @@ class Folders:
             yield from (folder.joinpath(*parts[k + 1 :]) for folder in self.packages(parts[k]))
         for k in range(1, len(parts) - 1):
             yield from (folder.joinpath(*parts[k:]) for folder in self._near())
+
+    def moved(self, path: str) -> Path | None:
+        """Return the file that an absolute path means that no file has, or None."""
+        place = Path(path.replace("\\", "/"))
+        return next(
+            (one for one in (place, *self._moved(place.parts)) if os.path.isfile(one)), None
+        )
+
+    def holding(self, inner: str) -> Path | None:
+        """Return a folder near the robot's that has the file `inner`, in folders of its own."""
+        near = self._near() if "/" in inner else ()
+        return next((one for one in near if os.path.isfile(one / inner)), None)
 
     def _alone(self, name: str) -> Path | None:
         """Return the file of that name in a folder near the robot's, if it is the only one."""

@@ -210,6 +210,39 @@ def test_tags_without_prefix_are_read(tmp_path, capsys):
     assert "colors.xacro: tags of xacro lack the prefix 'xacro:'" in capsys.readouterr().err
 
 
+ARM = (
+    "<xacro:macro name='arm'><link name='a'/><link name='b'/><joint name='j' type='revolute'>"
+    "<parent link='a'/><child link='b'/><limit/></joint></xacro:macro>"
+)
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        r'<xacro:include filename="parts\arm.xacro"/>',
+        '<xacro:include filename="urdf/parts/arm.xacro"/>',  # from the folder above
+        '<xacro:include filename="$(find of_another_name)/urdf/parts/arm.xacro"/>',
+        '<xacro:include filename="parts/arm.xacro"/><xacro:include filename="$(find nix)/a.xacro"/>'
+        '<xacro:camera parent="b"/>',
+        '<xacro:include filename="parts/arm.xacro"/><xacro:property name="p" '
+        "value=\"${xacro.load_yaml('nix.yaml')['at']}\"/>"
+        "<ros2_control><a b='${p[0]}'/></ros2_control>",
+    ],
+)
+def test_what_a_robot_needs_of_its_files_is_read(tmp_path, inside):
+    """Folders of Windows, of another place or name, sensors of a missing package, drivers."""
+    folder = tmp_path / "urdf" / "parts"
+    folder.mkdir(parents=True)
+    (folder / "arm.xacro").write_text(xacro(tmp_path, ARM).read_text())
+    assert robots.load_file(xacro(folder.parent, f"{inside}<xacro:arm/>")).model.njoints == 2
+
+
+def test_a_robot_whose_package_is_missing_is_refused(tmp_path):
+    inside = '<xacro:include filename="$(find nix)/a.xacro"/><xacro:arm/><link name="table"/>'
+    with pytest.raises(robots.RobotError, match="there is no package 'nix'"):
+        robots.load_file(xacro(tmp_path, inside))
+
+
 def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):
     for inside, words in (
         ("${nix}", "xacro cannot expand it: .*nix"),
