@@ -278,6 +278,8 @@ def check_size(text: bytes) -> str:
 
     Nothing is kept but the names of links.
     """
+    if not text.strip():
+        raise ValueError("it is empty")
     parser = expat.ParserCreate()
     opened: list[str] = []
     root: list[str] = []

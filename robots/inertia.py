@@ -218,7 +218,7 @@ def _list(links: list[str]) -> str:
     return f"link{'s' * (len(links) > 1)} {few(links)}"
 
 
-def few(names: Sequence[str]) -> str:
-    """List the first few of `names`, and say how many more there are."""
-    more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
-    return f"{', '.join(names[:_LISTED])}{more}"
+def few(names: Sequence[str], most: int = _LISTED) -> str:
+    """List the first of `names`, at `most` so many, and say how many more there are."""
+    more = f" and {len(names) - most} others" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"

@@ -139,8 +139,8 @@ class Folders:
 
     def searched(self) -> str:
         """Say where has been searched."""
-        home = self.file.absolute().parent
-        searched = [str(one) for one in (*self.given, self.file.parent, workspaces(home)[-1])]
+        home = Path(os.path.abspath(self.file)).parent
+        searched = [os.path.abspath(one) for one in (*self.given, home, workspaces(home)[-1])]
         searched += [
             f"${name} ({os.environ[name]})"
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
