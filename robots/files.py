@@ -27,6 +27,7 @@ from sphshell_pin.robots.description import (
     check_size,
     check_tree,
     drop_empty_shapes,
+    drop_loose_links,
     fix_root,
     frames_without_link,
     mimics_of,
@@ -89,12 +90,13 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    assumed, others = dict[str, str](), ""
+    assumed, others, moveless = dict[str, str](), "", ""
     try:
         if file.suffix.lower() == ".xacro":
-            from sphshell_pin.robots.xacro_file import expand
+            from sphshell_pin.robots.xacro_file import expand, listed_arguments
 
             text, assumed, others = expand(file, folders, xacro_args or {})
+            moveless = "" if re.search(rb"<joint\b", text) else listed_arguments(file)
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
@@ -106,6 +108,8 @@ def read(
         values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
         note = f"its arguments without a default are taken as {values}: or give others{others}"
         found = replace(found, notes=(*found.notes, note))
+    elif moveless:
+        found = replace(found, notes=(*found.notes, moveless))
     return found
 
 
@@ -132,6 +136,8 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
             for name in frames:
                 ET.SubElement(root, "link", name=name)
             notes.append(f"links that it does not have are frames: {', '.join(frames)}")
+        if loose := drop_loose_links(root):
+            notes.append(f"without links that no joint holds: {', '.join(loose)}")
         check_tree(root)
         drop_empty_shapes(root)
         notes += add_limits(root)

@@ -137,6 +137,8 @@ def mass_fault(
     moved = {f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint > 0}
     links = [one for one in description.root.iter("link") if one.get("name") in moved]
     empty = [one for one in links if not _mass(one)]
+    if not empty:
+        return f"{said} off its axis, nor a moment of inertia: write the <inertia> of its links"
     solid = [str(one.get("name")) for one in empty if one.find(".//geometry") is not None]
     if not solid:
         names = _list([str(one.get("name")) for one in empty])

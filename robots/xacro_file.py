@@ -173,9 +173,15 @@ def _advised(reason: str, file: Path) -> str:
         return (
             f"{reason}: the file that calls the macro fits another version of the one that has it"
         )
+    stated = listed_arguments(file)
+    return f"{reason}; {stated}" if stated else reason
+
+
+def listed_arguments(file: Path) -> str:
+    """Return the arguments of a file in a clause, "" if it has none."""
     stated = [f"{name} ({usual})" if usual else name for name, usual in _stated_arguments(file)]
-    sets = "; its arguments, which --xacro-arg NAME=VALUE sets: "
-    return reason + (sets + ", ".join(stated[:_LISTED]) if stated else "")
+    sets = "its arguments, which --xacro-arg NAME=VALUE sets: "
+    return sets + ", ".join(stated[:_LISTED]) if stated else ""
 
 
 def _stated_arguments(file: Path) -> list[tuple[str, str]]:

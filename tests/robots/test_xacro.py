@@ -181,6 +181,7 @@ def test_xacro_expressions_compute(tmp_path):
         "list(map(str, python.range(2)))": ["0", "1"],
         "1 if 1 < 2 < 2 else python.sum(x for x in [1, 2])": 3,
         "max(['aa', 'b'], key=len).count('a')": 2,
+        "'a_b'.split('_').pop()": "b",
     }
     start = "<xacro:property name='_tmp_' value='3'/>"
     start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
