@@ -90,13 +90,12 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    assumed, others, moveless = dict[str, str](), "", ""
+    said = list[str]()
     try:
         if file.suffix.lower() == ".xacro":
-            from sphshell_pin.robots.xacro_file import expand, listed_arguments
+            from sphshell_pin.robots.xacro_file import expand
 
-            text, assumed, others = expand(file, folders, xacro_args or {})
-            moveless = "" if re.search(rb"<joint\b", text) else listed_arguments(file)
+            text, said = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
@@ -104,13 +103,7 @@ def read(
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: {_not_read(file, '', error)}") from None
     found = described(text, folders, free_flyer=free_flyer)
-    if assumed:
-        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
-        note = f"its arguments without a default are taken as {values}: or give others{others}"
-        found = replace(found, notes=(*found.notes, note))
-    elif moveless:
-        found = replace(found, notes=(*found.notes, moveless))
-    return found
+    return replace(found, notes=(*found.notes, *said))
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:

@@ -40,10 +40,10 @@ def serve(source: int, target: int) -> None:
     answer: dict[str, str]
     try:
         folders = Folders.of(file, request["folders"])
-        urdf = _expanded(file, folders, request["arguments"])
+        urdf, left_out = _expanded(file, folders, request["arguments"])
         if len(urdf) > MOST_TEXT:
             raise ValueError(f"it expands to more than {MOST_TEXT / 1e6:g} MB")
-        answer = {"urdf": urdf, "said": said.getvalue()[:MOST_SAID]}
+        answer = {"urdf": urdf, "left_out": left_out, "said": said.getvalue()[:MOST_SAID]}
     except MemoryError:
         answer = {"fault": "memory"}
     except ValueError as error:
@@ -52,8 +52,8 @@ def serve(source: int, target: int) -> None:
         json.dump(answer, pipe)
 
 
-def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str:
-    """Return the URDF; ValueError with the reason of a file that cannot be expanded."""
+def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> tuple[str, str]:
+    """Return the URDF, and which macros are left out; ValueError with the reason of a fault."""
     import xacro
     from xacro import substitution_args
 
@@ -85,7 +85,9 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
-    return str(document.toxml())
+    called = ", ".join(dict.fromkeys(calls))
+    left_out = f"without {called}: {_absent(missing[0], file, folders)}" if calls else ""
+    return str(document.toxml()), left_out
 
 
 def _absent(name: str, file: Path, folders: Folders) -> str:
@@ -174,7 +176,6 @@ def _with_found_includes(
             except KeyError:
                 if node.parentNode.tagName != "visual":  # there it is a color
                     calls.append(node.tagName)
-                    xacro.warning(f"without {node.tagName}, a macro of a package that is missing")
                 xacro.replace_node(node, by=None)
                 return True
         return call(node, macros, symbols)

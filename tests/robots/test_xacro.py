@@ -238,6 +238,12 @@ def test_what_a_robot_needs_of_its_files_is_read(tmp_path, inside):
     assert robots.load_file(xacro(folder.parent, f"{inside}<xacro:arm/>")).model.njoints == 2
 
 
+def test_a_xacro_file_without_a_joint_that_moves_lists_its_arguments(tmp_path):
+    file = xacro(tmp_path, '<xacro:arg name="model" default="none"/><link name="a"/>')
+    with pytest.warns(robots.RobotWarning, match=r"arguments, which --xacro-arg .* model \(none\)"):
+        assert robots.load_file(file).model.nv == 0
+
+
 def test_a_robot_whose_package_is_missing_is_refused(tmp_path):
     inside = '<xacro:include filename="$(find nix)/a.xacro"/><xacro:arm/><link name="table"/>'
     with pytest.raises(robots.RobotError, match="there is no package 'nix'"):
