@@ -236,12 +236,12 @@ def exactly(
     file, loops = description.file, description.loops
     if loops and mimic:
         raise RobotError(
-            f"{file}: not supported: {'; '.join(loops)}; leave them out of the file, or load it "
+            f"{file}: not supported: {few(loops, most=2)}; leave them out of the file, or load it "
             "with mimic = false (--no-mimic), which lets these joints move freely"
         )
     if loops:
         loops = (
-            f"joints move freely that the file couples: {'; '.join(loops)}; "
+            f"joints move freely that the file couples: {few(loops, most=2)}; "
             "docs/joints.md shows how Pinocchio closes loops in a loop of your own",
         )
     for note in (*loops, *description.notes) if warn else ():

@@ -39,6 +39,33 @@ def frames_without_link(root: ET.Element) -> list[str]:
     return [name for name in names if name and name not in links] if links else []
 
 
+def drop_loose_links(root: ET.Element) -> list[str]:
+    """Take out the links that no joint holds to those that move; return their names.
+
+    Where two trees have joints that move, or none has one, all stays.
+    """
+    joints, links = root.findall("joint"), root.findall("link")
+    held_by = {one.get("link") for one in root.iterfind("joint/child")}
+    if sum(one.get("name") not in held_by for one in links) < 2:
+        return []
+    tree = {one.get("name"): {one.get("name")} for one in links}
+    for joint in joints:
+        ends = [tree.get(one.get("link"), set()) for one in joint if one.tag in ("parent", "child")]
+        whole = set().union(*ends)
+        tree.update(dict.fromkeys(whole, whole))
+    moved = [one for one in joints if one.get("type") != "fixed"]
+    kept = [tree.get(one.get("link"), set()) for joint in moved for one in joint.findall("child")]
+    if not kept or any(one != kept[0] for one in kept):
+        return []
+    for joint in joints:
+        if not kept[0] & {one.get("link") for one in joint}:
+            root.remove(joint)
+    loose = [one for one in links if one.get("name") not in kept[0]]
+    for link in loose:
+        root.remove(link)
+    return [str(one.get("name")) for one in loose]
+
+
 def drop_empty_shapes(root: ET.Element) -> None:
     """Take out shapes of size 0, which keep a place: nothing touches them."""
     for link in root.iter("link"):
@@ -278,6 +305,8 @@ def check_size(text: bytes) -> str:
 
     Nothing is kept but the names of links.
     """
+    if not text.strip():
+        raise ValueError("it is empty")
     parser = expat.ParserCreate()
     opened: list[str] = []
     root: list[str] = []

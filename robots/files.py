@@ -27,6 +27,7 @@ from sphshell_pin.robots.description import (
     check_size,
     check_tree,
     drop_empty_shapes,
+    drop_loose_links,
     fix_root,
     frames_without_link,
     mimics_of,
@@ -89,12 +90,12 @@ def read(
     for folder in folders.given:
         if not os.path.isdir(folder):
             raise RobotError(f"{file}: the mesh package folder {folder} does not exist")
-    assumed, others = dict[str, str](), ""
+    said = list[str]()
     try:
         if file.suffix.lower() == ".xacro":
             from sphshell_pin.robots.xacro_file import expand
 
-            text, assumed, others = expand(file, folders, xacro_args or {})
+            text, said = expand(file, folders, xacro_args or {})
         elif xacro_args:
             raise ValueError("arguments are for files that end in .xacro")
         else:
@@ -102,11 +103,7 @@ def read(
     except (ValueError, OSError) as error:
         raise RobotError(f"{file}: {_not_read(file, '', error)}") from None
     found = described(text, folders, free_flyer=free_flyer)
-    if assumed:
-        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
-        note = f"its arguments without a default are taken as {values}: or give others{others}"
-        found = replace(found, notes=(*found.notes, note))
-    return found
+    return replace(found, notes=(*found.notes, *said))
 
 
 def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) -> Description:
@@ -132,6 +129,8 @@ def described(text: bytes, folders: Folders, *, free_flyer: bool | None = None) 
             for name in frames:
                 ET.SubElement(root, "link", name=name)
             notes.append(f"links that it does not have are frames: {', '.join(frames)}")
+        if loose := drop_loose_links(root):
+            notes.append(f"without links that no joint holds: {', '.join(loose)}")
         check_tree(root)
         drop_empty_shapes(root)
         notes += add_limits(root)

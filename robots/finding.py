@@ -97,7 +97,8 @@ def find_robots(folder: str | PathLike[str]) -> Iterator[FoundRobot]:
             for k, one in enumerate(model.frames)
             if one.parentJoint > 0 and k not in carriers
         ]
-        fault = mass_fault(model, description.q0(model), description) or ""
+        absent = [one for one in description.notes if "there is no package" in one]
+        fault = mass_fault(model, description.q0(model), description) or "; ".join(absent)
         fault = "masses: --density 2700" if "--density" in fault else fault
         yield FoundRobot(file, model.njoints - 1, tuple(frames), fault)
 

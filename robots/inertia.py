@@ -137,6 +137,8 @@ def mass_fault(
     moved = {f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint > 0}
     links = [one for one in description.root.iter("link") if one.get("name") in moved]
     empty = [one for one in links if not _mass(one)]
+    if not empty:
+        return f"{said} off its axis, nor a moment of inertia: write the <inertia> of its links"
     solid = [str(one.get("name")) for one in empty if one.find(".//geometry") is not None]
     if not solid:
         names = _list([str(one.get("name")) for one in empty])
@@ -219,7 +221,7 @@ def _list(links: list[str]) -> str:
     return f"link{'s' * (len(links) > 1)} {few(links)}"
 
 
-def few(names: Sequence[str]) -> str:
-    """List the first few of `names`, and say how many more there are."""
-    more = f" and {len(names) - _LISTED} others" if len(names) > _LISTED else ""
-    return f"{', '.join(names[:_LISTED])}{more}"
+def few(names: Sequence[str], most: int = _LISTED) -> str:
+    """List the first of `names`, at `most` so many, and say how many more there are."""
+    more = f" and {len(names) - most} others" if len(names) > most else ""
+    return f"{', '.join(names[:most])}{more}"

@@ -68,6 +68,7 @@ class Folders:
         """Return the file that a description calls `uri`, or None: package://, file://, a path."""
         if self.kept is not None:
             return self.kept.get(uri)
+        uri = uri.replace("\\", "/")  # of Windows
         scheme, colon, rest = uri.partition("://")
         if colon and scheme in ("package", "model"):
             name, _, inner = rest.partition("/")
@@ -106,6 +107,18 @@ class Folders:
         for k in range(1, len(parts) - 1):
             yield from (folder.joinpath(*parts[k:]) for folder in self._near())
 
+    def moved(self, path: str) -> Path | None:
+        """Return the file that an absolute path means that no file has, or None."""
+        place = Path(path.replace("\\", "/"))
+        return next(
+            (one for one in (place, *self._moved(place.parts)) if os.path.isfile(one)), None
+        )
+
+    def holding(self, inner: str) -> Path | None:
+        """Return a folder near the robot's that has the file `inner`, in folders of its own."""
+        near = self._near() if "/" in inner else ()
+        return next((one for one in near if os.path.isfile(one / inner)), None)
+
     def _alone(self, name: str) -> Path | None:
         """Return the file of that name in a folder near the robot's, if it is the only one."""
         near = self._near()
@@ -126,8 +139,8 @@ class Folders:
 
     def searched(self) -> str:
         """Say where has been searched."""
-        home = self.file.absolute().parent
-        searched = [str(one) for one in (*self.given, self.file.parent, workspaces(home)[-1])]
+        home = Path(os.path.abspath(self.file)).parent
+        searched = [os.path.abspath(one) for one in (*self.given, home, workspaces(home)[-1])]
         searched += [
             f"${name} ({os.environ[name]})"
             for name in ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")

@@ -9,7 +9,7 @@ import json
 import re
 import resource
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +40,10 @@ def serve(source: int, target: int) -> None:
     answer: dict[str, str]
     try:
         folders = Folders.of(file, request["folders"])
-        urdf = _expanded(file, folders, request["arguments"])
+        urdf, left_out = _expanded(file, folders, request["arguments"])
         if len(urdf) > MOST_TEXT:
             raise ValueError(f"it expands to more than {MOST_TEXT / 1e6:g} MB")
-        answer = {"urdf": urdf, "said": said.getvalue()[:MOST_SAID]}
+        answer = {"urdf": urdf, "left_out": left_out, "said": said.getvalue()[:MOST_SAID]}
     except MemoryError:
         answer = {"fault": "memory"}
     except ValueError as error:
@@ -52,28 +52,27 @@ def serve(source: int, target: int) -> None:
         json.dump(answer, pipe)
 
 
-def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str:
-    """Return the URDF; ValueError with the reason of a file that cannot be expanded."""
+def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> tuple[str, str]:
+    """Return the URDF, and which macros are left out; ValueError with the reason of a fault."""
     import xacro
     from xacro import substitution_args
 
-    missing = set[str]()
+    missing, calls, renamed = _with_found_includes(xacro, folders)
 
     def find(name: str) -> str:
-        folder = folders.package(name)
+        folder = folders.package(name) or renamed.get(name)
         if folder is None:
             raise substitution_args.ArgException(_absent(name, file, folders))
         return str(folder)
 
     # xacro asks ament alone, which few machines have. $(eval find('name')) looks in the dictionary.
     substitution_args._eval_find = substitution_args._eval_dict["find"] = find
-    _without_missing_includes(xacro, folders, missing)
     _with_former_tags(xacro)
     try:
         install(xacro, substitution_args)
         document = _processed(xacro, file, arguments)
-        if missing and not _is_whole(document):
-            raise ValueError(_absent(min(missing), file, folders))
+        if missing and not _is_whole(document, moves=bool(calls)):
+            raise ValueError(_absent(missing[0], file, folders))
     except Exception as error:  # of the package xacro, which raises what happens to come up
         causes = list(_causes(error))
         if any(isinstance(one, MemoryError) for one in causes):
@@ -82,11 +81,13 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> str
             raise ValueError("its files, macros or elements are nested too deeply") from None
         reason = _reason(error, causes) or type(error).__name__
         if missing and "there is no package" not in reason:
-            reason = f"{_absent(min(missing), file, folders)} ({reason})"
+            reason = f"{_absent(missing[0], file, folders)} ({reason})"
         where = Path((xacro.filestack or [file])[-1]).name
         of = f" (in {where})" if where != file.name else ""
         raise ValueError(f"xacro cannot expand it{of}: {reason}") from None
-    return str(document.toxml())
+    called = ", ".join(dict.fromkeys(calls))
+    left_out = f"without {called}: {_absent(missing[0], file, folders)}" if calls else ""
+    return str(document.toxml()), left_out
 
 
 def _absent(name: str, file: Path, folders: Folders) -> str:
@@ -98,12 +99,14 @@ def _absent(name: str, file: Path, folders: Folders) -> str:
     )
 
 
-def _is_whole(document: Any) -> bool:
-    """Whether a robot has links, and all that its joints name."""
+def _is_whole(document: Any, *, moves: bool) -> bool:
+    """Whether a robot has links, all that its joints name, and if it `moves` a joint that does."""
     root = document.documentElement
+    kinds = {one.getAttribute("type") for one in root.getElementsByTagName("joint")} | {"fixed"}
     links = {one.getAttribute("name") for one in root.getElementsByTagName("link")} - {""}
     ends = [one for tag in ("parent", "child") for one in root.getElementsByTagName(tag)]
-    return bool(links) and {one.getAttribute("link") for one in ends} <= links | {""}
+    named = {one.getAttribute("link") for one in ends}
+    return bool(links) and named <= links | {""} and (not moves or kinds > {"fixed"})
 
 
 def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
@@ -114,12 +117,13 @@ def _processed(xacro: Any, file: Path, arguments: Mapping[str, str]) -> Any:
     try:
         return xacro.process_file(str(file), mappings=dict(arguments))
     except xacro.XacroException as error:
-        if "there is no package" in str(error):
+        if "is not defined" not in str(error):
             parse = xacro.parse
             xacro.parse = lambda *given: _of_robot(parse(*given))
-            return xacro.process_file(str(file), mappings=dict(arguments))
-        if "is not defined" not in str(error):
-            raise
+            try:
+                return xacro.process_file(str(file), mappings=dict(arguments))
+            except xacro.XacroException:
+                raise error from None
         xacro.init_stacks(str(file))
         document = xacro.parse(None, str(file))
         root = document.documentElement
@@ -138,36 +142,46 @@ def _of_robot(document: Any) -> Any:
     return document
 
 
-def _without_missing_includes(xacro: Any, folders: Folders, missing: set[str]) -> None:
-    """Let xacro leave out files of packages that are `missing`: of sensors that are not asked for.
+def _with_found_includes(
+    xacro: Any, folders: Folders
+) -> tuple[list[str], list[str], dict[str, Path]]:
+    """Let xacro include files from where they are, and leave out those of packages that are not.
 
-    Macros of theirs are unknown, and a fault where they are called, but for colors.
+    Returned are the packages that are missing, the calls of their macros, which are left out too
+    (sensors, mostly), and by package folders of another name that have its files.
     """
+    missing, calls, renamed = list[str](), list[str](), dict[str, Path]()
     included, call = xacro.get_include_files, xacro.handle_macro_call
 
-    def include(name: str, symbols: object) -> Iterable[str]:
-        package = re.match(r"\$\(find ([\w-]+)\)", name)
-        if package is None or folders.package(package[1]) is not None:
-            found: Iterable[str] = included(name, symbols)
-            return found
-        if package[1] not in missing:
-            missing.add(package[1])
-            xacro.warning(
-                f"without {name.rpartition('/')[2]}: there is no package '{package[1]}' "
-                "(see --package-dir)"
-            )
-        return ()
+    def include(name: str, symbols: object) -> Iterator[str]:
+        package = re.match(r"\$\(find ([\w-]+)\)[/\\]?(.*)", name)
+        if package is not None and folders.package(package[1]) is None:
+            folder = folders.holding(package[2])
+            if folder is None:
+                if package[1] not in missing:
+                    missing.append(package[1])
+                    xacro.warning(
+                        f"without {name.rpartition('/')[2]}: there is no package '{package[1]}' "
+                        "(see --package-dir)"
+                    )
+                return
+            renamed[package[1]] = folder
+        for file in included(name, symbols):
+            yield str(folders.moved(file) or file)
 
     def handle(node: Any, macros: Any, symbols: object) -> object:
-        if missing and node.tagName.startswith("xacro:") and node.parentNode.tagName == "visual":
+        if missing and node.tagName.startswith("xacro:") and node.tagName != "xacro:call":
             try:
                 xacro.resolve_macro(node.tagName[6:], macros, symbols)
             except KeyError:
+                if node.parentNode.tagName != "visual":  # there it is a color
+                    calls.append(node.tagName)
                 xacro.replace_node(node, by=None)
                 return True
         return call(node, macros, symbols)
 
     xacro.get_include_files, xacro.handle_macro_call = include, handle
+    return missing, calls, renamed
 
 
 def _with_former_tags(xacro: Any) -> None:

@@ -38,7 +38,7 @@ _METHODS = {
     "isascii isdecimal isdigit isidentifier islower isnumeric isspace istitle isupper join ljust "
     "lower lstrip partition removeprefix removesuffix replace rfind rindex rjust rpartition rsplit "
     "rstrip split splitlines startswith strip swapcase title upper zfill",
-    list: "copy count index",
+    list: "copy count index pop",
     tuple: "count index",
     dict: "copy get items keys values",
     set: "copy difference intersection isdisjoint issubset issuperset symmetric_difference union",

@@ -39,8 +39,8 @@ MEMORY_LIMIT = 1e9
 
 def expand(
     file: Path, folders: Folders, arguments: Mapping[str, object]
-) -> tuple[bytes, dict[str, str], str]:
-    """Return the URDF that the xacro file makes with `arguments`, and with others it needs.
+) -> tuple[bytes, list[str]]:
+    """Return the URDF that the xacro file makes with `arguments`, others it needs, and notes.
 
     Those have no default in it, or one that names a file that is not there: each has the value that
     another file states, else the first for which the file is there, else that of a condition is
@@ -53,7 +53,7 @@ def expand(
     assumed, others = dict[str, str](), ""
     while True:
         try:
-            return _expanded(file, folders, {**assumed, **arguments}), assumed, others
+            urdf, left_out = _expanded(file, folders, {**assumed, **arguments})
         except ValueError as error:
             needed = re.search(r"Undefined substitution argument (\w+)", str(error))
             if needed is not None and needed[1] not in assumed and len(assumed) < _LISTED:
@@ -66,6 +66,12 @@ def expand(
             if not choices or name in arguments:
                 raise ValueError(f"{error}{may}") from None
             assumed[name], others = choices[0], others + may
+            continue
+        values = " ".join(f"--xacro-arg {name}={value}" for name, value in assumed.items())
+        taken = f"its arguments without a default are taken as {values}: or give others{others}"
+        moves = assumed or re.search(rb'<joint\b[^>]*\btype="(?!fixed")', urdf)
+        notes = (left_out, taken if assumed else "", "" if moves else listed_arguments(file))
+        return urdf, [*filter(None, notes)]
 
 
 def _choices(said: str, values: Mapping[str, object]) -> tuple[str, list[str]]:
@@ -125,7 +131,7 @@ def _usual(argument: str, file: Path) -> str:
     return "false" if is_tested else argument
 
 
-def _expanded(file: Path, folders: Folders, arguments: Mapping[str, object]) -> bytes:
+def _expanded(file: Path, folders: Folders, arguments: Mapping[str, object]) -> tuple[bytes, str]:
     request = {
         "file": str(file),
         "folders": [str(one) for one in folders.given],
@@ -162,7 +168,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, object]) -> 
     if fault is not None or not isinstance(urdf, str):
         raise ValueError(f"xacro cannot expand it: its process {fault or 'gave no answer'}")
     sys.stderr.write(visible(answer["said"]))  # xacro's warnings
-    return urdf.encode()
+    return urdf.encode(), visible(str(answer.get("left_out") or ""))
 
 
 def _advised(reason: str, file: Path) -> str:
@@ -173,9 +179,15 @@ def _advised(reason: str, file: Path) -> str:
         return (
             f"{reason}: the file that calls the macro fits another version of the one that has it"
         )
+    stated = listed_arguments(file)
+    return f"{reason}; {stated}" if stated else reason
+
+
+def listed_arguments(file: Path) -> str:
+    """Return the arguments of a file in a clause, "" if it has none."""
     stated = [f"{name} ({usual})" if usual else name for name, usual in _stated_arguments(file)]
-    sets = "; its arguments, which --xacro-arg NAME=VALUE sets: "
-    return reason + (sets + ", ".join(stated[:_LISTED]) if stated else "")
+    sets = "its arguments, which --xacro-arg NAME=VALUE sets: "
+    return sets + ", ".join(stated[:_LISTED]) if stated else ""
 
 
 def _stated_arguments(file: Path) -> list[tuple[str, str]]:

@@ -66,9 +66,9 @@ _PLACES = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 
 # Differences of a number at its bound, from its one side.
 _AHEAD = ((0.0, -25.0 / 12.0), (1.0, 4.0), (2.0, -3.0), (3.0, 4.0 / 3.0), (4.0, -0.25))
 
-# What rounding leaves of a force or an acceleration, relative to the largest, and how much larger
-# than that, over the step, a derivative must be to be seen with 1e-7.
-_ROUNDING, _SEEN = 8.0 * float(np.finfo(float).eps), 1e7
+# What rounding leaves of a force or an acceleration at least, relative to the largest, and how much
+# larger than that, over the step, a derivative must be to be seen with 1e-7.
+_EPS, _SEEN = float(np.finfo(float).eps), 1e7
 
 # Steps, as shares of depth and speed, and the error from which on no further one is tried.
 _STEPS, _AGREED = (1e-3, 1e-4, 1e-5), 1e-7
@@ -116,7 +116,7 @@ def derivatives(scene: Scene, q: ArrayLike, v: Optional = None, tau: Optional = 
     # By torques they are linear: one step will do.
     pushes = np.eye(model.nv)
     by_tau = [acceleration(q, v, tau + 0.5 * e) - acceleration(q, v, tau - 0.5 * e) for e in pushes]
-    rounding = _ROUNDING * float(np.abs(got.acceleration).max(initial=0.0))
+    rounding = _rounding(acceleration, q, v)
     names = joint_names(model)
     findings.append(
         _compare("accelerations by tau", got.by_tau, np.transpose(by_tau), rounding, names)
@@ -185,13 +185,21 @@ def _best(with_step: Callable[[float], Finding]) -> Finding:
     return min(found, key=lambda one: one.error)
 
 
+def _rounding(f: _Function, q: Array, v: Array) -> float:
+    """Return what rounding leaves of f(q, v) -> (m,): it may be ill-conditioned."""
+    value, rng = f(q, v), np.random.default_rng(0)
+    nudges = [[1.0 + _EPS * rng.integers(-2, 3, len(x)) for x in (q, v)] for _ in range(8)]
+    nudged = [f(q * by_q, v * by_v) - value for by_q, by_v in nudges]
+    return 4.0 * float(np.max([2.0 * _EPS * np.abs(value), *np.abs(nudged)], initial=0.0))
+
+
 def _at_best(scene: Scene, q: Array, v: Array, what: str, f: _Function, got: _Pair) -> Finding:
     """Compare derivatives `got` of `f` by q and v with the step that agrees best."""
     model = scene.model
     names = joint_names(model)
     deep = _depth(scene, q, v)
     fast = max(float(np.abs(v).max(initial=0.0)), 1e-2)
-    rounding = _ROUNDING * float(np.abs(f(q, v)).max(initial=0.0))
+    rounding = _rounding(f, q, v)
 
     def with_step(share: float) -> Finding:
         steps = share * deep, share * fast

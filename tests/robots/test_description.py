@@ -31,6 +31,7 @@ REFUSED = {
     ),
     "declares an entity, 'e0'": f"<!DOCTYPE r [{ENTITIES}]>{robot('&e8;')}",
     "not well-formed XML": robot("")[:-1],
+    "it is empty": " ",
     # urdfdom reads the first of both: a chain that the last ones hide.
     "'j1' has 2 <parent> elements": robot(
         "".join(
@@ -73,6 +74,12 @@ def test_what_moves_nothing_is_mended(tmp_path):
     assert "without the negative effort limits of the joints 'j1'" in text
     assert loaded.model.existFrame("tool")
     assert loaded.collision_model.ngeoms == 0
+    file.write_text(robot(arm + "<link name='table'/>"))
+    with pytest.warns(robots.RobotWarning, match="without links that no joint holds: table"):
+        assert robots.load_file(file).model.nv == 1
+    file.write_text(robot(arm + joint(3, 2, "continuous") + "<link name='l2'/>"))
+    with pytest.raises(robots.RobotError, match="no joint moves or fixes the links 'l0', 'l2'"):
+        robots.load_file(file)
     file.write_text(robot(arm + tool.replace("fixed", "revolute")))
     with pytest.raises(robots.RobotError, match="child 'tool', but there is no such link"):
         robots.load_file(file)

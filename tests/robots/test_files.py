@@ -75,7 +75,8 @@ def test_the_package_that_the_file_is_in_is_found(tmp_path):
 def test_other_names_of_meshes(tmp_path):
     package(tmp_path / "arm_meshes")
     mesh = tmp_path / "arm_meshes/meshes/cube.stl"
-    for uri in (str(mesh), f"file://{mesh}", "arm_meshes/meshes/cube.stl"):
+    windows = r"package://arm_meshes\meshes\cube.stl"
+    for uri in (str(mesh), f"file://{mesh}", "arm_meshes/meshes/cube.stl", windows):
         assert robots.load_file(arm(tmp_path, collision=uri)).collision_model.ngeoms == 1
 
 

@@ -181,6 +181,7 @@ def test_xacro_expressions_compute(tmp_path):
         "list(map(str, python.range(2)))": ["0", "1"],
         "1 if 1 < 2 < 2 else python.sum(x for x in [1, 2])": 3,
         "max(['aa', 'b'], key=len).count('a')": 2,
+        "'a_b'.split('_').pop()": "b",
     }
     start = "<xacro:property name='_tmp_' value='3'/>"
     start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
@@ -208,6 +209,45 @@ def test_tags_without_prefix_are_read(tmp_path, capsys):
     links = robots.read(xacro(tmp_path, inside)).root.findall("link")
     assert [one.get("name") for one in links] == ["l0"]
     assert "colors.xacro: tags of xacro lack the prefix 'xacro:'" in capsys.readouterr().err
+
+
+ARM = (
+    "<xacro:macro name='arm'><link name='a'/><link name='b'/><joint name='j' type='revolute'>"
+    "<parent link='a'/><child link='b'/><limit/></joint></xacro:macro>"
+)
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        r'<xacro:include filename="parts\arm.xacro"/>',
+        '<xacro:include filename="urdf/parts/arm.xacro"/>',  # from the folder above
+        '<xacro:include filename="$(find of_another_name)/urdf/parts/arm.xacro"/>',
+        '<xacro:include filename="parts/arm.xacro"/><xacro:include filename="$(find nix)/a.xacro"/>'
+        '<xacro:camera parent="b"/>',
+        '<xacro:include filename="parts/arm.xacro"/><xacro:property name="p" '
+        "value=\"${xacro.load_yaml('nix.yaml')['at']}\"/>"
+        "<ros2_control><a b='${p[0]}'/></ros2_control>",
+    ],
+)
+def test_what_a_robot_needs_of_its_files_is_read(tmp_path, inside):
+    """Folders of Windows, of another place or name, sensors of a missing package, drivers."""
+    folder = tmp_path / "urdf" / "parts"
+    folder.mkdir(parents=True)
+    (folder / "arm.xacro").write_text(xacro(tmp_path, ARM).read_text())
+    assert robots.load_file(xacro(folder.parent, f"{inside}<xacro:arm/>")).model.njoints == 2
+
+
+def test_a_xacro_file_without_a_joint_that_moves_lists_its_arguments(tmp_path):
+    file = xacro(tmp_path, '<xacro:arg name="model" default="none"/><link name="a"/>')
+    with pytest.warns(robots.RobotWarning, match=r"arguments, which --xacro-arg .* model \(none\)"):
+        assert robots.load_file(file).model.nv == 0
+
+
+def test_a_robot_whose_package_is_missing_is_refused(tmp_path):
+    inside = '<xacro:include filename="$(find nix)/a.xacro"/><xacro:arm/><link name="table"/>'
+    with pytest.raises(robots.RobotError, match="there is no package 'nix'"):
+        robots.load_file(xacro(tmp_path, inside))
 
 
 def test_what_xacro_cannot_expand_is_said(tmp_path, monkeypatch):

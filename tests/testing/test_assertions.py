@@ -9,6 +9,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
+from sphshell_pin.testing import differences
 from sphshell_pin.testing.found import crossed
 from tests import meshes
 from tests.contact.smooth.surfaces import shell_of
@@ -108,6 +109,12 @@ def test_a_wrong_derivative_is_told(entry: int) -> None:
     match = f"the contact forces by {'qv'[entry]}: of joint .* by joint"
     with pytest.raises(AssertionError, match=match):
         testing.assert_derivatives(scene, ARM_Q, ARM_V)
+
+
+def test_differences_know_what_rounding_leaves_of_an_ill_conditioned_function() -> None:
+    x = np.array([0.3, 0.7])
+    assert 1e-10 < differences._rounding(lambda q, _: 1.1e8 * q - 1e8 * q - 1e7 * q, x, x) < 1e-6
+    assert differences._rounding(lambda q, v: q + v, x, x) < 1e-14
 
 
 def test_scenes_that_say_nothing_are_refused() -> None:

@@ -13,7 +13,7 @@ from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
 from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.robots import mass_fault
+from sphshell_pin.robots.inertia import lacks_masses, mass_fault
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.robot_check import probe_spheres
 from sphshell_pin.study.robot_check.models import Subject, listed
@@ -68,8 +68,10 @@ def setting_of(
     """
     model, notes = subject.robot.model, [*subject.notes]
     if model.nv == 0:
+        bare = lacks_masses(model, subject.robot.description, floating=True)
         raise SphshellError(
             f"the robot '{subject.name}' has no joint that moves: let its root float, --free-flyer"
+            + (" --density 2700" if bare else "")
         )
     postures = [random_posture(model, rng) for _ in range(5)]
     held = massless_joints(model, postures)
