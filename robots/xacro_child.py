@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.dom.minidom import Element
 
 from sphshell_pin.base.limits import limit_memory
 from sphshell_pin.robots.packages import Folders, stated_source
@@ -71,7 +72,7 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, str]) -> tup
     try:
         install(xacro, substitution_args)
         document = _processed(xacro, file, arguments)
-        if missing and not _is_whole(document, moves=bool(calls)):
+        if missing and not _is_whole(document.documentElement, moves=bool(calls)):
             raise ValueError(_absent(missing[0], file, folders))
     except Exception as error:  # of the package xacro, which raises what happens to come up
         causes = list(_causes(error))
@@ -99,9 +100,8 @@ def _absent(name: str, file: Path, folders: Folders) -> str:
     )
 
 
-def _is_whole(document: Any, *, moves: bool) -> bool:
+def _is_whole(root: Element, *, moves: bool) -> bool:
     """Whether a robot has links, all that its joints name, and if it `moves` a joint that does."""
-    root = document.documentElement
     kinds = {one.getAttribute("type") for one in root.getElementsByTagName("joint")} | {"fixed"}
     links = {one.getAttribute("name") for one in root.getElementsByTagName("link")} - {""}
     ends = [one for tag in ("parent", "child") for one in root.getElementsByTagName(tag)]

@@ -8,13 +8,11 @@ loads a mesh, and it is meant for viewers of the file.
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import coal
 import numpy as np
-from numpy.typing import NDArray
 
-from sphshell_pin.base.arrays import Array, Longs, frame_along
+from sphshell_pin.base.arrays import Array, Ints, Longs, frame_along
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.raw import KINDS, NO_SHAPE, RawSurface, raw_surface
 
@@ -185,7 +183,7 @@ def geometry_surface(
     raise InvalidParameter("geometry", type(shape).__name__, f"must be one of: {', '.join(known)}")
 
 
-def coal_tree(vertices: Array, triangles: NDArray[np.integer[Any]]) -> coal.BVHModelOBBRSS:
+def coal_tree(vertices: Array, triangles: Ints | Longs) -> coal.BVHModelOBBRSS:
     """Return Coal's tree of a mesh."""
     tree = coal.BVHModelOBBRSS()
     tree.beginModel(len(triangles), len(vertices))

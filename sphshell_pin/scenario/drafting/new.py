@@ -70,33 +70,33 @@ def new_scenario(
         except SphshellError as error:
             if (asked.frame, asked.tip) == (first.frame, first.tip):
                 refused = error
-            attempts += [
-                ((*notes, note), replace(asked, **changes))
-                for note, changes in _instead(error, asked)
-            ]
+            attempts += [((*notes, note), other) for note, other in _instead(error, asked)]
         else:
             return replace(made, why=tuple(one for one in (*notes, *made.why) if one))
     raise refused
 
 
-def _instead(error: SphshellError, asked: Asked) -> list[tuple[str, dict[str, Any]]]:
+def _instead(error: SphshellError, asked: Asked) -> list[tuple[str, Asked]]:
     """Return what to try where that fails which is asked for: why, and what is asked instead."""
     said = str(error).partition(";")[0]
     if isinstance(error, CannotReach) and asked.tip is None:
         others = error.others[:_MOST_ENDS] if asked.frame is None else ()
-        limbs = [(f"frame '{one}', as with '{error.frame}' {said}", one) for one in others]
+        limbs = [
+            (f"frame '{one}', as with '{error.frame}' {said}", replace(asked, frame=one))
+            for one in others
+        ]
         # A sphere of which the place is asked for stays there.
         stays = asked.offset is not None or (asked.frame and asked.radius) or error.out is None
-        farther = [] if stays else [("", {"tip": error.out})]
-        return [*((note, {"frame": frame}) for note, frame in limbs), *farther]
+        return limbs if stays else [*limbs, ("", replace(asked, tip=error.out))]
     if isinstance(error, TooHeavy) and asked.against is None:
-        return [(f"the part is of plastic, as with steel {said}", {"against": "plastic"})]
+        note = f"the part is of plastic, as with steel {said}"
+        return [(note, replace(asked, against="plastic"))]
     if isinstance(error, RobotError) and asked.mimic:
         note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
-        return [(note, {"mimic": False})]
+        return [(note, replace(asked, mimic=False))]
     if isinstance(error, CannotStand) and asked.base is None:
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-        return [(note, {"base": "fixed"})]
+        return [(note, replace(asked, base="fixed"))]
     return []
 
 
