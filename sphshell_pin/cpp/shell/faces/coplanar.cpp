@@ -14,7 +14,7 @@ constexpr double kSameSide = 0.9;
 // Triangles within so many tolerances of a plane may be in it once it is fitted. Fits go on until
 // so many triangles were looked at per triangle of the region, and these in small ones.
 constexpr double kBeside = 30;
-constexpr std::size_t kMostVisits = 8, kFewVisits = 300;
+constexpr std::size_t kLooksPerTriangle = 8, kFewLooks = 300;
 // Coordinates that are known to a larger share of the size are rounded coarsely: two triangles of a
 // plane may be off each other's.
 constexpr double kPrecise = 3e-7;
@@ -129,7 +129,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     // triangles stand off by little, the plane is fitted to what was found, and then to the nearest
     // of them as well, and all is looked for again. A fit may be ill-conditioned, as of needles in
     // a line.
-    for (bool grew = true; grew && next >= 0 && visits < kMostVisits * found.size() + kFewVisits;) {
+    for (bool grew = true;
+         grew && next >= 0 && visits < kLooksPerTriangle * found.size() + kFewLooks;) {
       grew = false;
       const std::size_t before = found.size();
       const int beside = next;
