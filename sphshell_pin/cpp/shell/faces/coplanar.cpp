@@ -15,9 +15,6 @@ constexpr double kSameSide = 0.9;
 // so many triangles were looked at per triangle of the region, and these in small ones.
 constexpr double kBeside = 30;
 constexpr std::size_t kLooksPerTriangle = 8, kFewLooks = 300;
-// Coordinates that are known to a larger share of the size are rounded coarsely: two triangles of a
-// plane may be off each other's.
-constexpr double kPrecise = 3e-7;
 
 // The plane of least squares over the areas of triangles, by their moments about a point.
 class PlaneFit {
@@ -62,7 +59,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     for (const int v : triangles[t]) most = std::max(most, std::abs((p[v] - origin).dot(normal)));
     return most;
   };
-  const double near = (tolerance > kPrecise * shell.size() ? kBeside : 1) * tolerance;
+  // Two triangles of a plane may be off each other's where coordinates are rounded coarsely.
+  const double near = (is_precise(shell, tolerance) ? 1 : kBeside) * tolerance;
   LargeArray<float> area(count);
   LargeArray<std::uint64_t> order(count);
   std::vector<int> found;

@@ -5,6 +5,12 @@
 
 namespace sphshell {
 
+// Whether coordinates that are known to `tolerance` [m] are rounded hardly more coarsely than in
+// single precision.
+inline bool is_precise(const Shell& shell, double tolerance) {
+  return tolerance < 3e-7 * shell.size();
+}
+
 // Connected triangles that lie in one plane within a tolerance, largest triangles first.
 class CoplanarRegions {
  public:

@@ -137,7 +137,7 @@ class Recognizer {
   bool recognize_from(int seed);
   void recognize_rims(int face);
   // Vertices that are rounded more coarsely than in single precision do not tell rims from strips.
-  bool is_precise() const { return tolerance_ < 3e-7 * shell_.size(); }
+  bool is_precise() const { return sphshell::is_precise(shell_, tolerance_); }
 
   // recognition.cpp
   bool is_fruitless() const;  // too many
