@@ -74,13 +74,15 @@ def test_a_flood_is_answered_and_survived(live):
 
 
 def test_wrong_names_and_values_are_told_to_the_one_who_asked(live):
+    push = {"body": "x", "direction": [1, 0, 0], "newtons": 1.0, "seconds": 1.0}
+
     async def visit():
         async with Client(live.url) as client, Client(live.url) as other:
             for kind, fields, words in (
                 ("parameter", {"key": "no_such", "value": 1.0}, "stiffness, radius"),
                 ("parameter", {"key": "stiffness", "value": -1.0}, "must be positive"),
                 ("show", {"part": "hat", "on": True}, "trails"),
-                ("hold", {"body": "x", "direction": [1, 0, 0], "newtons": 1.0}, "ball"),
+                ("push", push, "ball"),
             ):
                 client.errors.clear()
                 await client.say(kind, **fields)
