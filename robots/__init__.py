@@ -21,7 +21,6 @@ from sphshell_pin.robots.files import RobotError as RobotError
 from sphshell_pin.robots.files import build_geometry as build_geometry
 from sphshell_pin.robots.files import build_model as build_model
 from sphshell_pin.robots.files import is_path as is_path
-from sphshell_pin.robots.files import keep_geometry_of as keep_geometry_of
 from sphshell_pin.robots.files import keep_spheres as keep_spheres
 from sphshell_pin.robots.files import read as read
 from sphshell_pin.robots.finding import is_library_name as is_library_name
