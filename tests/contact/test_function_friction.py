@@ -40,7 +40,7 @@ def test_it_answers_as_its_twin(make) -> None:
     for speed in (0.0, 1e-6, 0.02, 0.1, 3.0):
         assert own.coefficient(speed, 5.0) == pytest.approx(SMOOTH.coefficient(speed), abs=1e-12)
     assert own.slip_time(2.0, 7.0, 0.0) == pytest.approx(SMOOTH.slip_time(2.0, 7.0, 0.0), rel=1e-9)
-    assert own.largest_coefficient == pytest.approx(0.3, rel=0.01)
+    assert own.coefficient(own.sticking_speed) == pytest.approx(0.3, rel=0.01)
     assert own.sticking_speed == pytest.approx(0.1, rel=0.15)
     assert (own.mu, own.v, own.has_state) == (0.3, 0.1, False)
     scenes = [models.on_plate(models.ball(), TWIN, one) for one in (own, SMOOTH)]
@@ -106,12 +106,6 @@ def test_what_does_not_vanish_at_rest_is_warned_of() -> None:
     constant = sp.FunctionFriction(FORCE(lambda s, n, p: 0.3 * n))
     with pytest.warns(errors.SetupWarning, match="does not vanish at rest"):
         models.on_plate(models.ball(), TWIN, constant)
-
-
-def test_pinocchios_constraints_take_its_largest_coefficient() -> None:
-    scene = models.on_plate(models.ball(), TWIN, OWN)
-    (made,) = scene.constraints(BALL).models
-    np.testing.assert_allclose(made.getFriction(), OWN.largest_coefficient)
 
 
 def test_a_scenario_names_it(tmp_path) -> None:
