@@ -29,9 +29,6 @@ from sphshell_pin.robots.inertia import few
 from sphshell_pin.robots.inertia import joints_without_mass as joints_without_mass
 from sphshell_pin.robots.inertia import mass_fault as mass_fault
 from sphshell_pin.robots.inertia import with_density as with_density
-from sphshell_pin.robots.mesh_spheres import MeshSpheres as MeshSpheres
-from sphshell_pin.robots.mesh_spheres import spheres_of_link as spheres_of_link
-from sphshell_pin.robots.mesh_spheres import spheres_of_mesh as spheres_of_mesh
 
 _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 
