@@ -365,7 +365,7 @@ def test_a_scenario_states_joints(tmp_path: Path) -> None:
         """
 title = "A link swings against its stop"
 [robot]
-urdf = "link.urdf"
+file = "link.urdf"
 joints = ["limits", "damping"]
 start = { hinge = -0.9 }
 [[joint]]

@@ -87,7 +87,7 @@ FAULTS = {
     "unknown mount": ('name = "ball"', MOUNT, "robot.ball.frame", "three_link_finger/tip"),
     "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
     "same label": ('"ball"', TAKEN, "robot[1]", ""),
-    "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such file"),
+    "no such urdf": ('name = "ball"', 'file = "b.urdf"', "robot[1]", "no such file"),
 }
 
 
