@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 import sphshell_pin as sp
 from sphshell_pin import _core
-from tests import meshes, models
 from tests.dynamics.test_mindlin import LAW, RUBBER, STEEL, STICKS, UP, R, disc
 from tests.studies import mostly_studies
 
@@ -97,37 +96,3 @@ def test_no_closed_path_gains_energy(seed: int, mu: float) -> None:
     size_of_work = friction.tangential_stiffness(disc(depth_0)) * (0.05 * depth_0) ** 2
     assert (np.diff(work) < 0).all()
     assert work[-1] < -1e-3 * size_of_work
-
-
-def bristle(seed: int) -> tuple[float, sp.NormalLaw, sp.BristleFriction, float]:
-    """Radius, law, friction, and what friction gives back: a part of what a bristle holds."""
-    friction = sp.BristleFriction(0.3, 0.25, 1e4, 20.0, torsional=bool(seed % 2))
-    held = 0.5 * (0.3 * 5 * 9.81) ** 2 / 1e4  # at five times the weight
-    return 0.05, models.linear_law(1e4, 30.0), friction, 0.05 * held
-
-
-def mindlin(seed: int) -> tuple[float, sp.NormalLaw, sp.MindlinFriction, float]:
-    rolling, rings = 0.01 * (seed // 2), 1 + seed
-    friction = sp.MindlinFriction(
-        0.3, 0.25, 1e6, 0.4, torsional=bool(seed % 2), rolling=rolling, rings=rings
-    )
-    return 0.1, sp.HuntCrossleyLaw(3e5, 1.5, 0.3), friction, 0.0
-
-
-@pytest.mark.parametrize("make", [bristle, mindlin])
-@pytest.mark.parametrize("seed", range(4))
-def test_energy_of_random_rolls(seed: int, make) -> None:  # type: ignore[no-untyped-def]
-    """Over a bumpy surface, with touches and lift-offs."""
-    rng, (radius, law, friction, held) = np.random.default_rng(seed), make(seed)
-    vertices, triangles = meshes.dome(cells=10, size=1.0, radius=1.0)
-    height = 0.02 * np.sin(9 * vertices[:, 0]) * np.cos(7 * vertices[:, 1])
-    shell = sp.Shell(vertices * [1, 1, -1] + height[:, None] * [0, 0, 1], triangles)
-    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
-    q = models.free_q([*rng.uniform(-0.1, 0.1, 2), 0.0])
-    q[2] = 0.1 + max(0.0, -float(shell.closest_points(q[None, :3]).distances[0]))
-    v = np.concatenate([rng.uniform(-0.5, 0.5, 3), rng.uniform(-10, 10, 3)])
-    run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q, v, 0.6)
-    assert len(run.contacts.t) > 100
-    assert np.abs(run.energy.residual).max() < 1e-5 * run.energy.exchanged
-    least = -(held or 1e-6 * run.energy.exchanged)
-    assert np.diff(run.energy.friction_loss).min() > least

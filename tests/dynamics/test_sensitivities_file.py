@@ -8,6 +8,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import ResultError
 from tests.patches.scenes import LAW, RADIUS, plate, slider
+from tests.results import damaged
 
 ASKED = ("tip.law.stiffness", "tip.sphere.offset", "v0")
 
@@ -42,16 +43,6 @@ def test_files_keep_them_to_the_bit(bounced, file):
     assert {f.name for f in fields(before)} == {
         "parameters", "q", "v", "force_world", "normal_force", "depth"
     }  # fmt: skip
-
-
-def damaged(file, name, change):
-    with np.load(file) as whole:
-        arrays = dict(whole)
-    changed = change(arrays.pop(name))
-    if changed is not None:
-        arrays[name] = np.asarray(changed)
-    np.savez(file, **arrays)
-    return file
 
 
 @pytest.mark.parametrize(
