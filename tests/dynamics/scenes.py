@@ -219,6 +219,11 @@ def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array
     return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
 
 
+def balls(law: str, friction: str) -> State:
+    """The two spheres in touch."""
+    return two_spheres(LAWS[law], FRICTIONS[friction]), *in_touch(3)
+
+
 def stuck() -> tuple[State, sp.results.SceneState]:
     """An arm whose bristles have been stretched by ten steps, far below the limit."""
     scene, q, v = on_plate(LAWS["undamped"], BRISTLE)

@@ -17,8 +17,8 @@ def press(**more) -> sp.CartesianImpedance:
 
 
 def moved(scene: sp.Scene, controller: sp.CartesianImpedance):
-    start = np.array([0.1, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0])
-    return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(start, None, 0.05, controller).q
+    start = models.free_q([0.1, 0.0, 0.3])
+    return models.run(scene, sp.RungeKutta4(1e-3), start, duration=0.05, controller=controller).q
 
 
 def test_the_place_of_a_shell_is_found_where_the_contacts_have_it() -> None:
@@ -52,14 +52,8 @@ def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
     model = models.arm()
     frame = model.frames[model.nframes - 1]
     offset = np.array([0.03, -0.02, 0.08])
-    model.addFrame(
-        pin.Frame(
-            "beside",
-            frame.parentJoint,
-            frame.placement * pin.SE3(np.eye(3), offset),
-            pin.FrameType.OP_FRAME,
-        )
-    )
+    place = frame.placement * pin.SE3(np.eye(3), offset)
+    model.addFrame(pin.Frame("beside", frame.parentJoint, place, pin.FrameType.OP_FRAME))
     shell, scene = models.plate(), sp.Scene(model)
     start = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
 
@@ -78,20 +72,10 @@ def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
 @pytest.mark.parametrize("integrator", [sp.RungeKutta4(1e-4), sp.Adaptive(1e-8, 1e-10)])
 def test_the_normal_force_comes_on_as_a_smooth_step(integrator) -> None:
     # A free mass is pushed away from the shell's normal: its speed is the integral of the force.
-    shell, scene = models.plate(), sp.Scene(models.ball())
-    start, rise, force = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]), 0.02, 3.0
-    controller = sp.CartesianImpedance(
-        "ball",
-        [[0.0, 0.0, 0.0]],
-        0.0,
-        0.0,
-        force,
-        shell=shell,
-        force_rise=rise,
-        joints=["ball_joint"],
-    )
-    mass = pin.computeTotalMass(scene.model)
-    result = sp.Simulation(scene, integrator).run(start, None, 0.03, controller, record_dt=1e-3)
+    rise, force, more = 0.02, 3.0, {"shell": models.plate(), "joints": ["ball_joint"]}
+    pressing = sp.CartesianImpedance("ball", PATH[:1], 0.0, 0.0, force, force_rise=rise, **more)
+    simulation = sp.Simulation(sp.Scene(models.ball()), integrator)
+    result = simulation.run(models.free_q([0, 0, 0.3]), None, 0.03, pressing, record_dt=1e-3)
     share = np.minimum(result.t / rise, 1.0)
-    pushed = force / mass * (rise * (share**3 - 0.5 * share**4) + np.maximum(result.t - rise, 0.0))
+    pushed = force * (rise * (share**3 - 0.5 * share**4) + np.maximum(result.t - rise, 0.0))
     np.testing.assert_allclose(result.v[:, 2], -pushed, rtol=1e-6, atol=1e-12)
