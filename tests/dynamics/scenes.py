@@ -190,12 +190,12 @@ OFFSET, OTHER_OFFSET = (0.01, -0.02, 0.03), (-0.03, 0.01, 0.02)
 ONE, TWO = sp.Sphere(R, "one", OFFSET), sp.Sphere(OTHER, "two", OTHER_OFFSET)
 
 
-def two_bodies() -> pin.Model:
-    """Free bodies "one" and "two", no gravity."""
+def two_bodies(inertia: pin.Inertia | None = None) -> pin.Model:
+    """Free bodies "one" and "two", no gravity; of the same inertia where one is given."""
     model = models.empty(0.0)
     lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
-    models.add_body(model, "one", pin.JointModelFreeFlyer())
-    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=lump)
+    models.add_body(model, "one", pin.JointModelFreeFlyer(), inertia=inertia)
+    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=inertia or lump)
     return model
 
 

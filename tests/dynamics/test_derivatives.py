@@ -75,9 +75,7 @@ SCENES: Scenes = {
     **family(lambda where, slip: somewhere(where, "impact", slip), PLACES, FRICTIONS),
     **family(lambda name, slip: somewhere(name, "impact", slip, SEEDS[slip]), SURFACES, FRICTIONS),
     # Mindlin's disc follows the curvature of the shell, with its slopes.
-    **family(
-        lambda name, _, slip: WHERE[name](HERTZ, FRICTIONS[slip]), ELLIPSES, ("hertz",), DISCS
-    ),
+    **family(lambda at, _, slip: WHERE[at](HERTZ, FRICTIONS[slip]), ELLIPSES, ("hertz",), DISCS),
     **family(on_facets, ELLIPSES, (0, 1)),
     **family(lambda k, method: at_corner(CORNERS[k], method), range(3), ("smooth", "facets")),
     **family(scenes.balls, ("impact", "hertz, two materials"), FRICTIONS),

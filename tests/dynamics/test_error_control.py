@@ -7,17 +7,14 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import ScenarioError
-from sphshell_pin.scenario.format.build import build
-from tests import meshes, models
+from tests import models
+from tests.models import run
 from tests.programs import python
-from tests.scenario import files
 
 R = 0.05
 ROOT = Path(__file__).parents[2]
 CONTROLLED = [sp.Adaptive(1e-7), sp.Implicit(1e-6)]
-FIXED = [sp.SemiImplicitEuler(1e-4), sp.RungeKutta4(1e-4), sp.LinearlyImplicitEuler(1e-4)]
-every = pytest.mark.parametrize("integrator", CONTROLLED + FIXED, ids=lambda one: one.kind)
+every = models.every_integrator(1e-4, 1e-7, 1e-6)
 both = pytest.mark.parametrize("integrator", CONTROLLED, ids=["Adaptive", "Implicit"])
 BRISTLE = sp.BristleFriction(0.4, 0.3, 1e4, 20.0)
 
@@ -29,16 +26,11 @@ def bouncing() -> sp.Scene:
 START = models.free_q([0.1, -0.05, R + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
 
 
-def run(scene: sp.Scene, integrator, q, v=None, duration=0.1, **more) -> sp.Result:
-    return sp.Simulation(scene, integrator).run(q, v, duration, **more)
-
-
 @both
 @pytest.mark.parametrize("record_dt", [1e-2, 1 / 300, 7e-4])
 def test_rows_stand_at_exact_multiples(integrator, record_dt: float) -> None:
     t = run(bouncing(), integrator, *START, 0.2, record_dt=record_dt).t
-    grid = np.arange(len(t) - 1) * record_dt
-    assert np.array_equal(t[:-1], grid)
+    assert np.array_equal(t[:-1], np.arange(len(t) - 1) * record_dt)
     assert t[-1] == 0.2
     # One row in every interval, and no second one a round-off before the end.
     assert 1e-9 < t[-1] - t[-2] <= record_dt * (1 + 1e-12)
@@ -148,37 +140,6 @@ def test_a_callable_is_asked_at_stages(integrator) -> None:
     assert rows.stats.steps < 1000
 
 
-@both
-def test_a_start_in_touch_and_at_rest(integrator) -> None:
-    q = models.free_q([0.0, 0.0, R - 9.81 / 4000.0])
-    rows = run(bouncing(), integrator, q, None, 2.0)
-    assert [(e.t, e.kind) for e in rows.events] == [(0.0, "touch")]
-    assert rows.q[-1] == pytest.approx(q, abs=1e-9)
-    assert rows.stats.steps < 3000
-
-
-def scenario(run_keys: str, friction: str = "") -> str:
-    text = files.DROP.replace("dt = 1e-4\n", run_keys)
-    return text.replace("\n[run]", f"{friction}\n[run]")
-
-
-@pytest.mark.parametrize(
-    ("keys", "said"),
-    [
-        ('integrator = "adaptive"\ndt = 1e-4\n', "adaptive takes rtol and atol, not dt"),
-        ('integrator = "implicit"\ndt = 1e-4\n', "implicit takes rtol and atol, not dt"),
-        ("dt = 1e-4\nrtol = 1e-4\n", "semi-implicit-euler takes dt, not rtol and atol"),
-        ('integrator = "adaptive"\nrtol = 1\n', "rtol"),
-        ('integrator = "adaptive"\nrtol = -1e-3\n', "rtol"),
-        ('integrator = "adaptiv"\n', "adaptive"),
-    ],
-)
-def test_scenario_refuses(tmp_path: Path, keys: str, said: str) -> None:
-    with pytest.raises(ScenarioError, match=said) as caught:
-        build(files.write(tmp_path, scenario(keys)))
-    assert len(str(caught.value).splitlines()) <= 2
-
-
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 1.0), (0.5, 0, 0), (0, 1.5, 0.3)])
 def test_bristles_of_a_source_hold_whatever_its_frames(turn) -> None:
     """The same plane on a frame turned any way: F / k stretches the bristle, and it sticks."""
@@ -200,26 +161,21 @@ def test_bristles_of_a_source_hold_whatever_its_frames(turn) -> None:
 
 def zoo() -> sp.Scene:
     """Free flyer on a chain of a planar, a spherical and a composite joint; the tip touches."""
-    model = models.empty()
+    model, parent = models.empty(), 0
     lump = pin.Inertia(1.0, np.array([0.02, 0.01, 0.03]), np.diag([0.02, 0.03, 0.04]))
     out = pin.SE3(np.eye(3), np.array([0.05, 0.02, 0.1]))
     mixed = pin.JointModelComposite(pin.JointModelRX())
     mixed.addJoint(pin.JointModelRUBY(), pin.SE3(np.eye(3), np.array([0.0, 0.03, 0.0])))
-    parent = 0
-    for i, joint in enumerate(
-        (pin.JointModelFreeFlyer(), pin.JointModelPlanar(), pin.JointModelSpherical(), mixed)
-    ):
-        parent = models.add_body(model, f"b{i}", joint, parent, placement=out, inertia=lump)
-    scene = sp.Scene(model)
-    shell = sp.Shell(*meshes.grid_plate(size=20, quads=True))
-    scene.add_contact(sp.Sphere(R, "b3"), shell, law=models.linear_law(1e4, 20.0), friction=BRISTLE)
-    return scene
+    kinds = pin.JointModelFreeFlyer(), pin.JointModelPlanar(), pin.JointModelSpherical(), mixed
+    for name, joint in zip(("a", "b", "c", "ball"), kinds, strict=True):
+        parent = models.add_body(model, name, joint, parent, placement=out, inertia=lump)
+    return models.on_shell(model, models.square(20), models.linear_law(1e4, 20.0), BRISTLE)
 
 
 def test_all_kinds_of_joints_agree() -> None:
     scene, rng = zoo(), np.random.default_rng(3)
     q = pin.integrate(scene.model, pin.neutral(scene.model), rng.uniform(-0.4, 0.4, scene.model.nv))
-    q[2] += R - 2e-3 - models.pose_of(scene.model, q, "b3").translation[2]
+    q[2] += R - 2e-3 - models.pose_of(scene.model, q, "ball").translation[2]
     v = rng.uniform(-2.0, 2.0, scene.model.nv)
     explicit = run(scene, sp.Adaptive(1e-11), q, v, 0.1)
     implicit = run(scene, sp.Implicit(1e-9), q, v, 0.1)
@@ -227,3 +183,12 @@ def test_all_kinds_of_joints_agree() -> None:
     apart = pin.difference(scene.model, explicit.q[-1], implicit.q[-1])
     assert np.abs(apart).max() < 1e-7
     assert np.abs(explicit.energy.residual).max() < 1e-7 * explicit.energy.exchanged
+
+
+@both
+def test_a_start_in_touch_and_at_rest(integrator) -> None:
+    q = models.free_q([0.0, 0.0, R - 9.81 / 4000.0])
+    rows = run(bouncing(), integrator, q, None, 2.0)
+    assert [(e.t, e.kind) for e in rows.events] == [(0.0, "touch")]
+    assert rows.q[-1] == pytest.approx(q, abs=1e-9)
+    assert rows.stats.steps < 3000

@@ -12,8 +12,9 @@ from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter
 from tests.contact.test_planes import egg, pose, rotations, scene_of, support
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_planes import over_plane, reach_of, touching
+from tests.dynamics.test_planes import FRICTIONS, over_plane, reach_of, touching
 from tests.meshes import cube, grid_plate, icosphere
+from tests.models import run
 
 KAPPA = 2e8  # [Pa/m]
 LAW = sp.FoundationLaw(2e5, 1e-3, 3.0)
@@ -22,8 +23,7 @@ ELASTIC = sp.FoundationLaw(2e5, 1e-3)
 
 def box(sides=(0.06, 0.05, 0.04)) -> sp.Shell:
     vertices, elements = cube(1.0, quads=True)
-    middle = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return sp.Shell((vertices - middle) * sides, elements)
+    return sp.Shell(vertices * sides, elements)
 
 
 def clipped(vertices: np.ndarray, edges: np.ndarray) -> tuple[float, np.ndarray]:
@@ -57,7 +57,10 @@ def test_the_force_is_that_of_the_volume_below_at_its_centroid(name: str) -> Non
         assert found.point_world[0] == pytest.approx(expected, abs=1e-9)
         assert found.depth == pytest.approx([-(lowest + q[2])], rel=1e-9)
         wrench = scene.external_forces(q, np.zeros(6))[1].vector
-        assert wrench[:3] == pytest.approx(rotation.T @ [0, 0, KAPPA * volume], rel=1e-9)
+        push = np.array([0, 0, KAPPA * volume])
+        torque = np.cross(np.array(expected) - q[:3], push)
+        assert wrench[:3] == pytest.approx(rotation.T @ push, rel=1e-9)
+        assert wrench[3:] == pytest.approx(rotation.T @ torque, abs=1e-9 * push[2])
 
 
 def test_the_cap_of_an_ellipsoid() -> None:
@@ -86,7 +89,6 @@ def test_a_sheet_bears_by_its_area() -> None:
     assert found.point_world[0] == pytest.approx([*(q[:2] + middle[:2]), 0.0])
 
 
-FRICTIONS = [None, sp.CoulombFriction(0.3, 0.2, 0.05, 0.5), sp.BristleFriction(0.4, 0.3, 2e4, 5.0)]
 SHELLS = {
     "box": box,
     "egg": lambda: egg(10, np.array([0.03, 0.02, 0.025])),
@@ -110,9 +112,27 @@ def test_derivatives_are_those_of_finite_differences(name, law, friction, ground
         testing.assert_wrenches_cancel(scene, q, v)
 
 
-def thrown(shell: sp.Shell, inertia: pin.Inertia, law, friction, tilt: float = 0.0):
-    """A free body over a plane that leans by `tilt` about y."""
-    return scene_of(shell, law, friction, inertia=inertia, normal=(np.sin(tilt), 0.0, np.cos(tilt)))
+SPUN = (0.1, 0, -0.2, 1.0, 2.0, 5.0)
+
+
+def thrown(shell: sp.Shell, inertia: pin.Inertia, law, friction):
+    """A free body over a level plane."""
+    return scene_of(shell, law, friction, inertia=inertia)
+
+
+def fallen(make, inertia, law, friction, integrator, *, v=SPUN, turn=(0.5, 0.3), **more):
+    """Run of a body that begins 5 mm above the plane, turned."""
+    shell, rotation = make(), pin.rpy.rpyToMatrix(*turn, 0.2)
+    height = 0.005 - (shell.vertices @ rotation[2]).min()
+    q = np.r_[0, 0, height, pin.Quaternion(rotation).coeffs()]
+    return run(thrown(shell, inertia, law, friction), integrator, q, np.array(v, float), **more)
+
+
+def assert_at_rest(result: sp.Result, steps: float) -> None:
+    """It lies still, the energies close, at an ordinary cost."""
+    assert result.stats.steps <= steps
+    assert np.abs(result.v[-1]).max() < 1e-6
+    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
 
 
 BOX = pin.Inertia.FromBox(0.2, 0.06, 0.05, 0.04)
@@ -126,15 +146,8 @@ BOX = pin.Inertia.FromBox(0.2, 0.06, 0.05, 0.04)
 )
 def test_a_box_comes_to_rest_at_an_ordinary_cost(integrator, friction) -> None:
     """It falls on a corner, tumbles, spins, and lies still; the energies close."""
-    shell = box()
-    scene = thrown(shell, BOX, sp.FoundationLaw(1e5, 1e-3, 10.0), friction)
-    turn = pin.rpy.rpyToMatrix(0.5, 0.3, 0.2)
-    height = 0.005 - (shell.vertices @ turn[2]).min()
-    q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
-    result = sp.Simulation(scene, integrator).run(q, np.array([0.1, 0, -0.2, 1.0, 2.0, 5.0]), 1.0)
-    assert result.stats.steps <= 20_000
-    assert np.abs(result.v[-1]).max() < 1e-6
-    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
+    law = sp.FoundationLaw(1e5, 1e-3, 10.0)
+    assert_at_rest(fallen(box, BOX, law, friction, integrator, duration=1.0), 20_000)
 
 
 def test_a_block_that_spins_on_its_face_is_slowed_by_the_moment_of_all_its_points() -> None:
@@ -208,61 +221,19 @@ def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: 
     def moment(_t, q, v, _contacts) -> np.ndarray:
         return np.r_[0, 0, 0, -loss * (tilt_of(q) / tilt) ** power * v[3:] / (v[3:] @ v[3:])]
 
-    duration = end * (1 - 0.35 ** (1 / exponent))
-    result = sp.Simulation(scene, sp.Adaptive(1e-5, 1e-8)).run(
-        q,
-        [0, 0, 0, -spin, 0, 0],
-        1.1 if own else duration,
-        **({} if own else {"controller": moment, "control_dt": 5e-4}),
-    )
+    duration, more = end * (1 - 0.35 ** (1 / exponent)), {"controller": moment, "control_dt": 5e-4}
+    if own:
+        duration, more = 1.1, {}
+    result = run(scene, sp.Adaptive(1e-5, 1e-8), q, [0, 0, 0, -spin, 0, 0], duration, **more)
     tilts = [tilt_of(one) for one in result.q]
-    fitted = curve_fit(
-        lambda t, a, b, c: a * np.maximum(1 - t / b, 1e-9) ** c,
-        result.t,
-        tilts,
-        (tilt, 2.0 if own else end, exponent),
-    )[0]
+
+    def expected(t, a, b, c):
+        return a * np.maximum(1 - t / b, 1e-9) ** c
+
+    guess = tilt, 2.0 if own else end, exponent
+    fitted = curve_fit(expected, result.t, tilts, guess)[0]
     assert fitted[2] == pytest.approx(exponent, rel=0.05 if own else 0.03)
     assert own or fitted[1] == pytest.approx(end, rel=0.02)
-
-
-@pytest.mark.parametrize("slope", [0.3, 0.45])
-def test_a_block_on_a_slope_slides_above_the_angle_of_friction_alone(slope: float) -> None:
-    mu = 0.4
-    friction = sp.BristleFriction(mu, mu, 1e5, 30.0)
-    scene = thrown(box(), BOX, sp.FoundationLaw(5e5, 1e-3, 10.0), friction, slope)
-    turn = pin.utils.rotate("y", slope)
-    q = np.r_[turn @ [0, 0, 0.02], pin.Quaternion(turn).coeffs()]
-    result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.3)
-    moved = (result.v @ np.eye(6, 3))[:, 0]  # down the slope, in the box's frame
-    if slope < np.arctan(mu):
-        assert np.abs(result.v[-1]).max() < 1e-6
-    else:
-        late = result.t > 0.2
-        found = np.polyfit(result.t[late], moved[late], 1)[0]
-        expected = 9.81 * (np.sin(slope) - mu * np.cos(slope))
-        assert found == pytest.approx(expected, rel=1e-4)
-
-
-def test_a_tall_block_tips_where_its_corner_says() -> None:
-    """Between sides in the ratio of the slope's tangent it falls over, else it stands."""
-    slope, stands = 0.2, []
-    for width in (0.9, 1.1):
-        height = 0.06
-        sides = (width * height * np.tan(slope), 0.05, height)
-        scene = thrown(
-            box(sides),
-            pin.Inertia.FromBox(0.2, *sides),
-            sp.FoundationLaw(5e7, 1e-3, 1.0),
-            sp.CoulombFriction(0.9, 0.9, 0.001, 0.1),
-            slope,
-        )
-        turn = pin.utils.rotate("y", slope)
-        q = np.r_[turn @ [0, 0, height / 2], pin.Quaternion(turn).coeffs()]
-        result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, np.zeros(6), 0.5)
-        lean = turn.T @ pin.Quaternion(result.q[-1, 3:]).matrix()
-        stands.append(bool(lean[2, 2] > 0.99))
-    assert stands == [False, True]
 
 
 def test_laws_and_friction_that_need_a_radius_are_refused() -> None:

@@ -55,34 +55,6 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_acceleration_is_that_of_the_model_reduced_by_hand(name: str) -> None:
-    make, tip, other = CASES[name]
-    (model, full), random = make(), np.random.default_rng(3)
-    scene, free = with_contact(model, tip, other), with_contact(full, tip, other)
-    matrix, offset = reduction(model, full)
-    data = full.createData()
-    touched = 0
-    for _ in range(20):
-        q = random.uniform(-0.3, 0.3, model.nq)
-        v, tau = random.standard_normal(model.nv), random.standard_normal(model.nv)
-        z = 1e-4 * random.standard_normal(scene._binding.bristle_size)
-        found = scene._binding.rates(q, v, z, tau)[: model.nv]
-        forces = scene.contacts(q, v)
-        touched += len(forces.depth)
-        q_full, v_full = matrix @ q + offset, matrix @ v
-        mass = pin.crba(full, data, q_full)
-        mass = np.triu(mass) + np.triu(mass, 1).T
-        z_full = np.zeros(free._binding.bristle_size)
-        z_full[: len(z)] = z
-        bias = pin.nonLinearEffects(full, data, q_full, v_full)
-        # What the contact adds, from the full model's own accelerations.
-        added = mass @ (free._binding.rates(q_full, v_full, z_full, bias)[: full.nv])
-        expected = np.linalg.solve(matrix.T @ mass @ matrix, tau + matrix.T @ (added - bias))
-        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * abs(expected).max())
-    assert touched
-
-
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-7, 1e-9)])
 def test_a_closing_grasp_keeps_its_energy(integrator: sp.Adaptive | sp.Implicit) -> None:
     model, full = gripper()

@@ -21,10 +21,8 @@ from tests.dynamics.scenes import (
     LAWS,
     STOPS,
     in_bowl,
-    in_touch,
     moving,
     stuck,
-    two_spheres,
 )
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import two_free_bodies, two_free_state
@@ -115,10 +113,9 @@ def test_a_touching_step(make, law: str, stepper: str) -> None:  # type: ignore[
 
 SCENES = {friction: partial(in_bowl, LAWS["impact"], FRICTIONS[friction]) for friction in BRISTLES}
 SCENES |= {name: partial(scenes.mimicking, name) for name in MIMIC}
-SCENES |= {
-    "two spheres": lambda: (two_spheres(LAWS["impact"], COULOMB), *in_touch(3)),
-    "joint components": partial(in_bowl, LAWS["impact"], COULOMB, joints=STOPS),
-}
+SCENES["two spheres"] = partial(scenes.balls, "impact", "coulomb")
+SCENES |= {name: partial(scenes.mimicking, name) for name in MIMIC}
+SCENES["joint components"] = partial(in_bowl, LAWS["impact"], COULOMB, joints=STOPS)
 
 
 @every_stepper

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
-from sphshell_pin.errors import InvalidParameter
 from tests import models
 from tests.results import assert_same_bits
 
@@ -59,22 +57,18 @@ def test_held_torques_are_those_of_the_last_time_of_control():
         asked.append(KP * (Q0 + 0.3 - q) - KD * v)
         return asked[-1]
 
-    result = simulation().run(
-        Q0, duration=0.02, controller=controller, control_dt=4e-3, record_dt=1e-3, record=["torque"]
-    )
+    given = {"control_dt": 4e-3, "record_dt": 1e-3, "record": ["torque"]}
+    result = simulation().run(Q0, duration=0.02, controller=controller, **given)
     assert len(asked) == 5  # not once more for the rows
     assert np.isnan(result.torque[0]).all()  # before the first
-    rows = np.ceil(np.arange(1, 21) / 4 - 1e-9).astype(int) - 1
-    np.testing.assert_array_equal(result.torque[1:], np.array(asked)[rows])
+    np.testing.assert_array_equal(result.torque[1:], np.repeat(asked, 4, axis=0))
 
 
 def test_they_are_cut_to_the_limits_of_the_motors_and_zero_without_a_controller():
-    cut = simulation(effort=0.01).run(
-        Q0, duration=0.02, controller=pd(), record_dt=1e-3, record=["torque"]
-    )
+    given = {"duration": 0.02, "record_dt": 1e-3, "record": ["torque"]}
+    cut = simulation(effort=0.01).run(Q0, controller=pd(), **given)
     assert np.abs(cut.torque[:, 0]).max() == 0.01
-    free = simulation().run(Q0, duration=0.01, record_dt=1e-3, record=["torque"])
-    assert np.array_equal(free.torque, np.zeros((11, 3)))
+    assert not simulation().run(Q0, **given).torque.any()
 
 
 def test_they_are_saved_and_known_to_rollouts_and_open_runs(tmp_path):
@@ -93,16 +87,7 @@ def test_they_are_saved_and_known_to_rollouts_and_open_runs(tmp_path):
     assert first.torque is None
     np.testing.assert_array_equal(second.torque, result.torque[11:])
     assert open_run.snapshot().torque.shape == (1, 3)
-
-
-def test_a_start_that_was_recorded_before_has_none():
-    open_run = OpenRun(simulation(), Q0, controller=pd(), record_dt=1e-3)
+    # A start that was recorded before has none.
+    open_run = OpenRun(run, Q0, controller=pd(), record_dt=1e-3)
     open_run.record_torques()
-    rows = open_run.advance(2e-3)
-    assert np.isnan(rows.torque[0]).all()
-    assert np.isfinite(rows.torque[1:]).all()
-
-
-def test_another_name_is_refused():
-    with pytest.raises(InvalidParameter, match="must be 'patch' or 'torque'"):
-        simulation().run(Q0, duration=0.01, record=["force"])
+    assert np.isnan(open_run.advance(2e-3).torque).any(axis=1).tolist() == [True, False, False]
