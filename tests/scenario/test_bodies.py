@@ -6,7 +6,6 @@ import pytest
 
 from sphshell_pin import robots
 from sphshell_pin.dynamics import Scene
-from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario.format.bodies import assemble, reduce_visual, restrict
 from sphshell_pin.scenario.format.reading import read_scenario
 from tests.models import pose_of
@@ -73,34 +72,6 @@ def test_locking_keeps_the_other_joints_values(tmp_path):
     assert max(g.parentJoint for g in visual.geometryObjects) == reduced.njoints - 1
 
 
-FINGER = "robot.three_link_finger"
-TAKEN = '"three_link_finger"\nlabel = "three_link_finger"'
-MOUNT = 'name = "ball"\nframe = "three_link_finger/tpi"'
-FAULTS = {
-    # What is put in: old text, new text, how the key begins, words that are told.
-    "unknown joint": ("knuckle = 0.3", "nuckle = 0.3", f'{FINGER}.start."nuckle"', "knuckle"),
-    "unknown joint in speed": ("knuckle = 1.5", "x = 1", f'{FINGER}.speed."x"', "knuckle"),
-    "unknown joint to lock": ('["middle_joint"]', '["x"]', f"{FINGER}.lock[0]", "distal_joint"),
-    "number for seven": ("[1, 2, 3, 0, 0, 0.6, 0.8]", "1", "robot.ball.start", "list of 7"),
-    "short list": ("3, 4, 5, 6]", "3]", 'robot.ball.speed."root_joint"', "6 numbers"),
-    "no unit quaternion": ("0.6, 0.8]", "0, 0.5]", "robot.ball.start", "its length is"),
-    "unknown mount": ('name = "ball"', MOUNT, "robot.ball.frame", "three_link_finger/tip"),
-    "unknown robot": ('"ball"', '"bal"', "robot.bal", "ball"),
-    "same label": ('"ball"', TAKEN, "robot[1]", ""),
-    "no such urdf": ('name = "ball"', 'urdf = "b.urdf"', "robot[1]", "no such file"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_name_the_key(fault, tmp_path):
-    old, new, key, words = FAULTS[fault]
-    assert old in TWO
-    with pytest.raises(ScenarioError) as caught:
-        assembled(tmp_path, TWO.replace(old, new, 1))
-    assert caught.value.key.startswith(key)
-    assert words in str(caught.value)
-
-
 GRIPPER = text_of("scenarios/gripper.toml").replace("FILE", f"{DATA}/mjcf/gripper.xml")
 
 
@@ -125,25 +96,6 @@ def test_mimic_joints_are_exact_unless_they_are_not_wanted(tmp_path):
 )
 def test_a_start_may_name_mimic_joints(tmp_path, keys, q):
     assert np.allclose(gripper(tmp_path, keys).q0, q)
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        (
-            "start = { right_finger = 0.01, left_finger = 0.02 }",
-            r'start."right_finger": joint \'right_finger\' cannot be at 0.01: it mimics .* at 0.02',
-        ),
-        ("q = [0.1, 0.02, 0.03]", r"robot\[0\].q: joint 'right_finger' cannot be at 0.03"),
-        ("q = [0.1]", r"has 2 coordinates \(3 with those of mimic joints\), not 1"),
-        ("speed = { right_finger = 0.1 }", "mimics 'left_finger': state the speed of that one"),
-        ('pose = "home"', "no pose 'home'"),
-        ("xacro_args = { a = 1 }", "arguments are for files that end in .xacro"),
-    ],
-)
-def test_a_start_against_a_mimic_joint_is_refused(tmp_path, keys, words):
-    with pytest.raises(ScenarioError, match=words):
-        gripper(tmp_path, keys)
 
 
 def test_one_joint_of_a_group_locks_all(tmp_path):

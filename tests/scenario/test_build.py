@@ -79,36 +79,6 @@ def test_a_gain_spares_the_free_bodies(tmp_path):
     np.testing.assert_allclose(controller.posture(model, built.q0)[:4], [0.5, 0, 0, 0])
 
 
-PD = '[controller]\ntype = "joint-pd"\nkp = {}\nkd = 1\nq_ref = {}\n[run]'
-IMPEDANCE = text_of("scenarios/impedance.toml") + "[run]"
-SOURCE = text_of("scenarios/source_table.toml") + "[run]"
-BOX = 'primitive = { type = "box", size = [0.2, 0.2, 0.02] }'
-FAULTS = {
-    # What is put in: old text, new text, the key that is told, words that are told.
-    "frame": ('frame = "ball"', 'frame = "bal"', "contact.ball-plate", "root_joint"),
-    "shell": ('shell = "plate"', 'shell = "plaet"', "contact.ball-plate.shell", "plate"),
-    "shell's frame": ("placement", 'frame = "x"\nplacement', "contact.ball-plate", "universe"),
-    "surface": (BOX, 'file = "none.stl"', "shell.plate", "none.stl"),
-    "flat box": ("0.2, 0.02]", "0.2, -0.02]", "shell.plate.primitive.size[2]", "greater"),
-    "kp's length": ("[run]", PD.format("[1, 2]", "{}"), "controller.kp", "(6,)"),
-    "q_ref's length": ("[run]", PD.format("1", "[1]"), "controller.q_ref", "(7,)"),
-    "controller's frame": ("[run]", IMPEDANCE, "controller", "no frame 'x'"),
-    "kp's joint": ("[run]", PD.format("{ x = 1 }", "{}"), "controller.kp", "root_joint"),
-    "own figure": ("[run]", '[figures]\nx = "a.py:b"\n[run]', "figures.x", "no such file"),
-    "source": ("[run]", SOURCE, "source.s.find", "no such file"),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_faults_name_the_key(fault, tmp_path):
-    old, new, key, words = FAULTS[fault]
-    assert old in DROP
-    with pytest.raises(ScenarioError) as caught:
-        build(write(tmp_path, DROP.replace(old, new, 1)))
-    assert caught.value.key == key
-    assert words in str(caught.value)
-
-
 @pytest.mark.parametrize("method", ["facets", "smooth", "elements"])
 def test_methods(method, tmp_path):
     built = build(write(tmp_path, DROP.replace(LAW_LINE, f'method = "{method}"\n{LAW_LINE}')))

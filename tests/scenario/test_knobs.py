@@ -54,29 +54,6 @@ def test_any_number_may_be_a_knob(key, more, unit, value, restart, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        (knob("contact.ball-plate.law.stifness"), r"no 'stifness'.*did you mean 'stiffness'"),
-        (knob("contact.tip.law.stiffness"), r"there are: ball-plate"),
-        (knob("shell.plate.name"), r"shell\.plate\.name: is not a number"),
-        (knob("run.rtol"), r"run\.rtol: is not a number"),
-        (knob("contact.ball-plate.law"), r"is not a number"),
-        (knob(STIFFNESS) + knob(STIFFNESS), r"knob\[1\]\.key: is a knob already"),
-        (knob(STIFFNESS) + knob("contact.0.law.stiffness"), r"is a knob already"),
-        (knob(STIFFNESS, "min = 2e6\nmax = 3e6"), r"outside its range 2e\+06 to 3e\+06"),
-        (knob(STIFFNESS, "min = 3e6\nmax = 2e6"), r"min 3e\+06 must be less than max 2e\+06"),
-        (knob(STIFFNESS, "min = 0\nmax = 2e6\nlog = true"), r"min must be positive with log"),
-        (knob("gravity.2"), r"needs min and max, as 'gravity.2' is not positive"),
-        (knob(STIFFNESS, "mim = 3"), r"did you mean 'min'"),
-    ],
-)
-def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
-    with pytest.raises(ScenarioError, match=match) as caught:
-        build(write(tmp_path, DROP + text))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
     "name", mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__)
 )
 def test_shipped_knobs_hold_over_their_range(name):
@@ -183,19 +160,6 @@ def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
 
 METHOD = "contact.ball-plate.method"
 WITH_METHOD = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
-
-
-@pytest.mark.parametrize(
-    ("text", "more", "says"),
-    [
-        (DROP, "", "is not set"),
-        (WITH_METHOD, "min = 1", "is for numbers"),
-        (WITH_METHOD, 'unit = "m"', "is for numbers"),
-    ],
-)
-def test_a_word_that_cannot_be_a_knob(text, more, says, tmp_path):
-    with pytest.raises(ScenarioError, match=says):
-        build(write(tmp_path, text + knob(METHOD, more)))
 
 
 def test_a_word_acts_on_the_run_under_way(tmp_path):
