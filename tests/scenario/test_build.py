@@ -9,6 +9,7 @@ from sphshell_pin.scenario import build
 from tests.scenario.files import DROP, write
 from tests.texts import text_of
 
+HERTZ = '{ type = "hertz", radius = 0.012, young = 2e11, poisson = 0.3 }'
 LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
 
 
@@ -19,13 +20,7 @@ LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
         ('{ type = "adams" }', "ImpactLaw", "exponent", 2.2),
         ('{ type = "impact", stiffness = 5 }', "ImpactLaw", "exponent", ImpactLaw(5.0).exponent),
         ('{ type = "hunt-crossley", stiffness = 5 }', "HuntCrossleyLaw", "stiffness", 5.0),
-        (
-            '{ type = "hertz", radius = 0.012, young = 2e11, poisson = 0.3, '
-            "young_2 = 2e11, poisson_2 = 0.3 }",
-            "ImpactLaw",
-            "stiffness",
-            4 / 3 * np.sqrt(0.012) * 1e11 / 0.91,
-        ),
+        (HERTZ, "ImpactLaw", "stiffness", 4 / 3 * np.sqrt(0.012) * 1e11 / 0.91),
     ],
 )
 def test_laws(law, kind, attribute, value, tmp_path):
@@ -54,20 +49,18 @@ def test_primitives_are_closed_shells_of_their_size(primitive, tmp_path):
 
 
 def test_a_python_controller_is_found_beside_the_file(tmp_path):
-    (tmp_path / "own.py").write_text(
-        "import numpy as np\ndef tau(t, q, v, contacts):\n    return 0\n"
-    )
+    (tmp_path / "own.py").write_text("def tau(t, q, v, contacts):\n    return 0\n")
     text = DROP.replace("[run]", '[controller]\ntype = "python"\nfunction = "own.py:tau"\n[run]')
     assert build(write(tmp_path, text)).controller(0, 0, 0, 0) == 0
-    with pytest.raises(ScenarioError, match=r"no function 'tua'.*has: tau"):
-        build(write(tmp_path, text.replace("own.py:tau", "own.py:tua")))
-    with pytest.raises(ScenarioError, match="no such file"):
-        build(write(tmp_path, text.replace("own.py", "other.py")))
-    with pytest.raises(ScenarioError, match=r"file\.py:function"):
-        build(write(tmp_path, text.replace("own.py:tau", "own")))
-    (tmp_path / "own.py").write_text("import nothing_of_that_name\n")
-    with pytest.raises(ScenarioError, match="nothing_of_that_name"):
-        build(write(tmp_path, text))
+    (tmp_path / "wrong.py").write_text("import nothing_of_that_name\n")
+    for function, said in (
+        ("own.py:tua", r"no function 'tua'.*has: tau"),
+        ("other.py:tau", "no such file"),
+        ("own", r"file\.py:function"),
+        ("wrong.py:tau", "nothing_of_that_name"),
+    ):
+        with pytest.raises(ScenarioError, match=said):
+            build(write(tmp_path, text.replace("own.py:tau", function)))
 
 
 def test_a_gain_spares_the_free_bodies(tmp_path):

@@ -61,18 +61,11 @@ def test_shipped_knobs_hold_over_their_range(name):
     knobs = live_parameters(built)
     assert knobs
     for one in knobs:
-        if one.choices:
-            for word in one.choices:
-                (again,) = (
-                    k for k in live_parameters(rebuild(built, {one.key: word})) if k.key == one.key
-                )
-                assert again.value == word
-            continue
-        assert one.low <= one.value <= one.high
-        for value in (one.low, one.high):
-            turned = rebuild(built, {one.key: repr(value)})
-            (again,) = (k for k in live_parameters(turned) if k.key == one.key)
-            assert again.value == pytest.approx(value, rel=1e-12)
+        assert one.choices or one.low <= one.value <= one.high
+        for value in one.choices or (one.low, one.high):
+            turned = rebuild(built, {one.key: str(value)})
+            (again,) = (k.value for k in live_parameters(turned) if k.key == one.key)
+            assert again == value or again == pytest.approx(value, rel=1e-12)
 
 
 def test_a_rebuild_keeps_what_did_not_change(tmp_path):
@@ -119,13 +112,6 @@ def test_a_rebuild_moves_as_a_fresh_build_does(tmp_path, name, changes):
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
 
 
-def test_a_refused_change_leaves_the_scenario_alone(tmp_path):
-    built = build(write(tmp_path))
-    with pytest.raises(ScenarioError, match=r"contact\.ball-plate\.law\.stiffness"):
-        rebuild(built, {STIFFNESS: "-1"})
-    assert rebuild(built, {}).scenario == built.scenario
-
-
 def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     key = "contact.ball-plate.law.damping"
     path = write(tmp_path, DROP + knob(key))
@@ -141,10 +127,7 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
 
 def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
     adams = 'law = { type = "adams", units = "in-lbf-s" }'
-    hertz = (
-        'law = { type = "hertz", radius = 0.01, young = 1e9, poisson = 0.3, young_2 = 1e9, '
-        "poisson_2 = 0.3, restitution = 0.5, speed = 1 }"
-    )
+    hertz = 'law = { type = "hertz", young = 1e9, poisson = 0.3, restitution = 0.5, speed = 1 }'
     law = next(line for line in DROP.splitlines() if line.startswith("law"))
     for text, key, label, unit, high in (
         (adams, "k", "stiffness", "lbf/in^2.2", 1e6),
