@@ -11,8 +11,7 @@ import sphshell_pin as sp
 from sphshell_pin.errors import SphshellError
 from tests import meshes, models
 from tests.contact.helpers import shell_of
-from tests.contact.test_function_friction import OWN
-from tests.contact.test_function_law import C_LAW, FORCE, force
+from tests.contact.test_function_law import C_LAW, FORCE, OWN, force
 
 LAW, NAN, STILL, UP = sp.ImpactLaw(1e5), np.nan, pin.Motion.Zero(), [0, 0, 1]
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
