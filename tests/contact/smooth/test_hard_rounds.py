@@ -15,11 +15,10 @@ from tests.contact.smooth.hard_cases import (
     assert_no_jump,
     fails,
     find,
-    given,
     graph,
     stored,
 )
-from tests.contact.smooth.surfaces import cylinder_mesh
+from tests.contact.smooth.surfaces import cylinder_mesh, given
 from tests.oracle.pieces import potential_and_force
 
 RING = (

@@ -7,7 +7,8 @@ from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from tests import meshes
 from tests.contact.helpers import energy, force_sum
-from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, given, push
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, push
+from tests.contact.smooth.surfaces import given
 from tests.oracle.pieces import potential_and_force
 
 
