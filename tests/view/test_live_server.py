@@ -141,7 +141,7 @@ def test_the_end_is_told():
             return client
 
     client = run(visit())
-    assert client.ends == 1
+    assert client.end
     assert client.closed
 
 
