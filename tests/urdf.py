@@ -47,3 +47,10 @@ def write(path: Path, *parts: str) -> Path:
     """Write the file of a robot of these parts; return its path."""
     path.write_text(robot(*parts), encoding="utf-8")
     return path
+
+
+def xacro(file: Path, *parts: str) -> Path:
+    """Write the xacro file of a robot "arm" of these parts; return its path."""
+    head = '<robot name="arm" xmlns:xacro="http://wiki.ros.org/xacro">'
+    file.write_text(f"{head}{''.join(parts)}</robot>", encoding="utf-8")
+    return file
