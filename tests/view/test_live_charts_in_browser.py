@@ -60,3 +60,7 @@ def test_quantities_and_their_curves_can_be_chosen(tab):
     assert tab.live._charts.keys == ("q.knuckle", "q.distal_joint")
     tab.page.locator("h1").click()
     assert not tab.page.locator("#curve-list").is_visible()
+    # Both runs are compared at the same simulated time.
+    before = tab.points("q.knuckle")
+    tab.reset()
+    np.testing.assert_array_equal(tab.points("q.knuckle", "ghost"), before)
