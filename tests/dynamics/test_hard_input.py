@@ -10,11 +10,13 @@ import sphshell_pin as sp
 from sphshell_pin.errors import Interrupted, InvalidParameter, UnitWarning
 from tests import meshes, models
 
+TIP = sp.Sphere(0.1, "tip")
 
-def ball_model(joint=None, inertia=None) -> pin.Model:
+
+def ball_model(inertia=None) -> pin.Model:
     model = models.empty()
     inertia = inertia or pin.Inertia.FromSphere(1.0, 0.1)
-    models.add_body(model, "tip", joint or pin.JointModelFreeFlyer(), inertia=inertia)
+    models.add_body(model, "tip", pin.JointModelFreeFlyer(), inertia=inertia)
     return model
 
 
@@ -28,34 +30,26 @@ def test_a_ball_that_fills_a_faceted_socket_touches_every_facet() -> None:
 
 @pytest.mark.parametrize("spin", [1.0, 100.0])
 def test_a_free_planar_body_keeps_its_momentum(spin: float) -> None:
-    model = ball_model(pin.JointModelPlanar())
-    model.gravity.linear = np.zeros(3)
-    start = np.array([0.0, 0.0, 1.0, 0.0])
-    result = sp.Simulation(sp.Scene(model), sp.SemiImplicitEuler(1e-3)).run(
-        start, [1.0, 0.0, spin], 1.0
-    )
+    model = models.ball(gravity=0.0, joint=pin.JointModelPlanar())
+    start, v = [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, spin]
+    result = models.run(sp.Scene(model), sp.SemiImplicitEuler(1e-3), start, v, 1.0)
     assert np.linalg.norm(result.v[-1, :2]) == pytest.approx(1.0, abs=1e-12)
     assert result.q[-1, :2] == pytest.approx([1.0, 0.0], abs=1e-12)
 
 
 def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
     """The pair before it has been evaluated when the source throws; its contacts have no row."""
-    calls = 0
+    calls = iter(range(40))
 
     def find(pose_i: pin.SE3, pose_j: pin.SE3):
-        nonlocal calls
-        calls += 1
-        if calls > 40:
+        if next(calls, None) is None:
             raise KeyboardInterrupt
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
 
-    scene = sp.Scene(ball_model())
-    plate = sp.Shell(*meshes.grid_plate())
-    law = sp.ImpactLaw(1e4, 1.5)
-    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=plate, law=law, name="plate")
+    scene, law = sp.Scene(ball_model()), sp.ImpactLaw(1e4, 1.5)
+    scene.add_contact(TIP, sp.Shell(*meshes.grid_plate()), law=law, name="plate")
     scene.add_contact_source(find, "tip", "universe", law, name="mine")
-    q = pin.neutral(scene.model)
-    q[2] = 0.099
+    q = models.free_q([0, 0, 0.099])
     with pytest.raises(Interrupted) as caught:
         sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(q, None, 1.0)
     result = caught.value.result
@@ -95,48 +89,46 @@ def test_normals_of_needles_do_not_depend_on_the_first_corner() -> None:
         assert np.linalg.norm(normal - np.sign(normal @ exact) * exact) < 1e-8
 
 
+def explained(sphere: sp.Sphere, shell: sp.Shell, model=None, **more) -> list[str]:
+    """The warnings of the explanation of a contact."""
+    scene = sp.Scene(model or ball_model())
+    scene.add_contact(sphere, shell, law=models.LAW, **more)
+    return scene.explain().warnings
+
+
+def warned(words: str, *given, **more) -> bool:
+    return any(words in one for one in explained(*given, **more))
+
+
 def test_one_sided_open_shells_are_warned_of() -> None:
-    scene = sp.Scene(ball_model())
-    sheet = sp.Shell(*meshes.grid_plate(), side="outside")
-    scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=sheet, law=models.LAW)
-    q = pin.neutral(scene.model)
-    q[2] = 0.2
-    assert any("one-sided" in warning for warning in scene.explain(q).warnings)
+    assert warned("one-sided", TIP, sp.Shell(*meshes.grid_plate(), side="outside"))
 
 
 def test_a_radius_in_millimeters_is_suspected() -> None:
-    scene, shell = sp.Scene(models.arm()), sp.Shell(*meshes.grid_plate(), name="plate")
+    plate = sp.Shell(*meshes.grid_plate(), name="plate")
     with pytest.warns(UnitWarning, match="radius = 10 .* is more than the robot's reach"):
-        scene.add_contact(sphere=sp.Sphere(10, "ball"), shell=shell, law=models.LAW)
-    assert any("is it in mm?" in warning for warning in scene.explain().warnings)
+        assert warned("is it in mm?", sp.Sphere(10, "ball"), plate, models.arm())
 
 
 def test_millimeters_taken_for_meters_are_suspected() -> None:
-    scene = sp.Scene(ball_model())
     vertices, elements = meshes.grid_plate()
-    large = sp.Shell(1000 * vertices, elements, name="plate")
     with pytest.warns(UnitWarning, match="'plate'.*unit='mm'"):
-        scene.add_contact(sphere=sp.Sphere(0.1, "tip"), shell=large, law=models.LAW)
-    assert any("unit='mm'" in warning for warning in scene.explain().warnings)
+        assert warned("unit='mm'", TIP, sp.Shell(1000 * vertices, elements, name="plate"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        scene.add_contact(
-            sphere=sp.Sphere(0.1, "tip"), shell=sp.Shell(vertices, elements), law=models.LAW
-        )
+        explained(TIP, sp.Shell(vertices, elements))
 
 
 @pytest.mark.parametrize(
-    ("friction", "warned"),
+    ("friction", "warns"),
     [
         (sp.CoulombFriction(0.8, 0.68), True),
         (sp.CoulombFriction(0.8, 0.68, 0.005, 0.05), False),
         (sp.BristleFriction(0.8, 0.68, 1e4, 10.0), False),
     ],
 )
-def test_friction_that_creeps_visibly_is_warned_of(friction: sp.Friction, warned: bool) -> None:
-    scene = sp.Scene(ball_model())
-    plate = sp.Shell(*meshes.grid_plate())
-    scene.add_contact(sp.Sphere(0.01, "tip"), plate, law=models.LAW, friction=friction)
-    assert any("creeps at 0.035 m/s" in one for one in scene.explain().warnings) == warned
+def test_friction_that_creeps_visibly_is_warned_of(friction: sp.Friction, warns: bool) -> None:
+    given = sp.Sphere(0.01, "tip"), sp.Shell(*meshes.grid_plate())
+    assert warned("creeps at 0.035 m/s", *given, friction=friction) == warns
     creep = friction.creep_speed
     assert creep == 0.0 or friction.coefficient(creep) == pytest.approx(0.4, rel=1e-12)

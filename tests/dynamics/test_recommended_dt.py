@@ -194,15 +194,6 @@ def on_a_slide(side: str) -> sp.Scene:
     return pair_of(model, sphere, models.plate(side=side), "table", turn)
 
 
-def lever() -> sp.Scene:
-    """A link of inertia I on a hinge, its tip L away: I / L^2, at L w."""
-    model = models.empty(0.0)
-    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.2, 0.3]))
-    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.06]))
-    models.add_body(model, "ball", models.pin.JointModelRY(), inertia=inertia, frame=tip)
-    return models.on_plate(model, ELASTIC["linear"])
-
-
 def beside_a_border() -> sp.Scene:
     """The normal leads to the center."""
     sphere = sp.Sphere(RADIUS, "ball", (0.53, 0.0, 0.04))
@@ -241,7 +232,6 @@ FIGURES = [
         for side in ("both", "outside", "inside")
         for x in (0.03, -0.02, -0.08)
     ),
-    (lever, [0.0], [0.5], 0.01, 0.2 / 0.4**2, 0.4 * 0.5),
     (beside_a_border, [0.0], [-0.5], 0.0, MASS / 0.64, 0.4),
 ]
 
