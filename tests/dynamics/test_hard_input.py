@@ -1,14 +1,26 @@
-"""Runs that are easy to get wrong: crowded contacts, callbacks that throw, odd models and times."""
+"""What is easy to get wrong: crowded contacts, callbacks that throw, odd models, times, numbers."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import Interrupted, InvalidParameter, UnitWarning
+from sphshell_pin.errors import (
+    DataError,
+    Interrupted,
+    InvalidParameter,
+    InvalidShell,
+    ResultError,
+    UnitWarning,
+)
+from sphshell_pin.patches import ShellTaxels
+from sphshell_pin.study.fit import Experiment
+from sphshell_pin.study.fit.data import read_experiment
 from tests import meshes, models
+from tests.models import LAW, arm, ball, free_q, on_plate
 
 TIP = sp.Sphere(0.1, "tip")
 
@@ -132,3 +144,129 @@ def test_friction_that_creeps_visibly_is_warned_of(friction: sp.Friction, warns:
     assert warned("creeps at 0.035 m/s", *given, friction=friction) == warns
     creep = friction.creep_speed
     assert creep == 0.0 or friction.coefficient(creep) == pytest.approx(0.4, rel=1e-12)
+
+
+def _set(name: str, value: object):
+    return lambda model: setattr(model, name, value)
+
+
+def _mass(value: float):
+    return lambda model: setattr(model.inertias[1], "mass", value)
+
+
+HERE, NOWHERE = pin.SE3.Identity(), pin.SE3(np.full((3, 3), np.nan), np.zeros(3))
+DEADLY = {
+    "parent": lambda model: model.parents.__setitem__(1, 7),
+    "mass nan": _mass(np.nan),
+    "placement nan": lambda model: model.jointPlacements.__setitem__(1, NOWHERE),
+}
+CHANGES = DEADLY | {
+    "joint": lambda model: model.addJoint(1, pin.JointModelRX(), HERE, "new"),
+    "no gravity": lambda model: setattr(model.gravity, "linear", np.zeros(3)),
+    "mass": _mass(2.0),
+    "frame": lambda model: model.addFrame(pin.Frame("new", 1, HERE, pin.FrameType.OP_FRAME)),
+}
+DEADLY["negative mass"] = _mass(-1.0)
+
+
+@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_changed_model_is_noticed(change: str, compiled: bool) -> None:
+    scene = on_plate(ball(), LAW)
+    simulation = sp.Simulation(scene)
+    if compiled:
+        scene.contacts(Q)
+    varied = scene.with_pairs(scene.pairs)
+    CHANGES[change](scene.model)
+    for use in (
+        lambda: scene.model,
+        lambda: scene.external_forces(Q),
+        lambda: scene.contacts(np.r_[Q, 0.3]),
+        lambda: scene.contact_derivatives(Q),
+        lambda: scene.explain(Q),
+        lambda: simulation.run(Q, None, 0.01),
+        lambda: simulation.rollout([Q] * 2, None, 0.01),
+        lambda: varied.contacts(Q),
+    ):
+        with pytest.raises(InvalidParameter, match=r"scene\.model was changed"):
+            use()
+
+
+def test_an_untouched_model_is_one_object_and_equal_to_the_given_one() -> None:
+    model = arm()
+    scene = sp.Scene(model)
+    assert scene.model is scene.model
+    assert scene.model is not model
+    assert scene.model == model
+    CHANGES["joint"](model)
+    assert len(scene.external_forces(pin.neutral(scene.model))) == scene.model.njoints
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        *((damage, "joint") for damage in DEADLY.values()),
+        (lambda model: model.joints[1].setIndexes(1, 40, 40), "indices of joint"),
+        (lambda model: model.joints[1].setIndexes(9, 0, 0), "indices of joint"),
+        (lambda model: model.joints[1].setIndexes(1, -1, 0), "indices of joint"),
+        (lambda model: model.nqs.__setitem__(1, 3), "indices of joint"),
+        (lambda model: model.idx_vs.__setitem__(1, 40), "lists of indices"),
+        (lambda model: model.subtrees[1].append(40), "supports or subtrees"),
+        (lambda model: model.supports[1].append(40), "supports or subtrees"),
+        (_set("armature", np.zeros(1)), "armature has 1 numbers, nv is 6"),
+        (_set("lowerPositionLimit", np.zeros(1)), "lowerPositionLimit has 1 numbers, nq is 7"),
+    ],
+)
+def test_a_model_that_pinocchio_would_not_survive_makes_no_scene(damage, said: str) -> None:
+    model = ball()
+    damage(model)
+    with pytest.raises(InvalidParameter, match=said):
+        sp.Scene(model)
+
+
+Q = free_q([0.0, 0.0, 0.049])
+NAMES = np.array(["a", "b"])
+
+
+def test_laws_at_the_end_of_the_numbers_run_and_are_explained() -> None:
+    scene = on_plate(ball(), sp.HuntCrossleyLaw(1e308, 1e20))
+    assert "1 contact pair" in str(scene.explain(Q))
+    assert len(sp.Simulation(scene).run(Q, None, 0.001).t)
+
+
+def test_arguments_are_named(tmp_path) -> None:
+    scene = on_plate(ball(), LAW)
+    result = sp.Simulation(scene).run(Q, None, 0.001)
+    path = tmp_path / "run.mcap"
+    for said, use in {
+        "scale = .* makes the shell too large": lambda: scene.pairs[0].side_j.shell.transformed(
+            1e308
+        ),
+        "name = .* must be a name": lambda: scene.replace_pair(NAMES, law=LAW),
+        "kind = .* must be a name": lambda: result.plot(NAMES),
+        "pair = .* must be a name": lambda: ShellTaxels(NAMES),
+        "q = .* must hold 7 numbers": lambda: scene.contacts(np.ma.masked_equal(Q, 0.0)),
+    }.items():
+        with pytest.raises(InvalidParameter, match=said):
+            use()
+    with pytest.raises(InvalidShell, match="elements must not be masked"):
+        sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2))
+    pytest.importorskip("mcap")
+    with pytest.raises(InvalidParameter, match="scene = 'wrong' must be a Scene"):
+        result.to_mcap(path, scene="wrong")
+    with pytest.raises(ResultError, match="are not all from 1970 to 2038"):
+        replace(result, t=np.full_like(result.t, -1e308)).to_mcap(path)
+
+
+def read(force, **more):
+    """Return the data of a force at two times; `more` columns by name."""
+    data = {"t [s]": [0.0, 1.0], "f [N]": force} | more
+    return read_experiment(Experiment(data), 1, {"f": "N"}, 1.0)
+
+
+def test_data_that_cannot_be_computed_with_are_named() -> None:
+    with pytest.raises(DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
+        read([1.0, 1e308])
+    with pytest.raises(DataError, match=r"'f.sigma' must be positive .*too small to compute with"):
+        read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
+    assert read(np.ma.masked_greater([1.0, 2.0], 1.5))[0].measured.tolist() == [1.0]

@@ -1,6 +1,5 @@
 """Sensitivities of runs, through touches, against differences of whole runs."""
 
-import pickle
 from itertools import product
 
 import numpy as np
@@ -185,24 +184,6 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
 
 
-@pytest.mark.study
-@pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-9)], ids=str)
-def test_the_panda_on_the_blade(integrator: object) -> None:
-    """The scenario's impedance controller, 50 ms from before the touch."""
-    pytest.importorskip("example_robot_data")
-    from sphshell_pin.scenario import build
-
-    built = build("fingertip_on_blade")
-    pair = built.scene.pairs[0].name
-    more = {"controller": built.controller, "control_dt": 1e-3, "record_dt": 0.01}
-    case = Case(built.scene, built.q0, built.v0, 0.05, integrator, **more)
-    names = ["law.stiffness", "law.damping", "friction.mu_static", "sphere.radius", "placement"]
-    # The controller's torques are differenced; its decoupling solves for an inertia of 6 by 6.
-    columns = [f"{pair}.{name}" for name in names] + ["v0"]
-    result = case.check(columns, depth=1e-4, tolerance=3e-5)
-    assert len(result.contacts.t)
-
-
 def test_a_joint_that_meets_its_stop() -> None:
     stop = sp.JointLimits(-0.1, 0.1, sp.HuntCrossleyLaw(2e5, 1.5, 0.3))
     joints = sp.JointComponents(limits={"ball_joint": stop})
@@ -262,9 +243,3 @@ def test_an_interrupted_run_has_those_of_its_rows() -> None:
         simulation.run(case.q0, case.v0, 100.0, sensitivities=["v0"], progress=stop)
     result = stopped.value.result
     assert result.sensitivities.q.shape == (len(result.t), case.scene.model.nv, case.scene.model.nv)
-
-
-def test_they_are_pickled() -> None:
-    result = drop(IMPACT, duration=0.03).run(names=["v0"])
-    again = pickle.loads(pickle.dumps(result))
-    assert again.sensitivities.q.tobytes() == result.sensitivities.q.tobytes()

@@ -14,7 +14,6 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences, models
 from tests.dynamics import scenes
 from tests.dynamics.scenes import (
-    BRISTLE,
     BRISTLES,
     COULOMB,
     FRICTIONS,
@@ -191,19 +190,10 @@ def test_a_state_with_bristles() -> None:
 
 
 def test_bad_input() -> None:
-    """Names, states and results are those of `dynamics_derivatives`."""
+    """What else is refused is that of `dynamics_derivatives`."""
     scene, q, v = in_bowl(LAWS["impact"], COULOMB)
     for integrator in (sp.Adaptive(), sp.Implicit()):
         with pytest.raises(InvalidParameter, match="SemiImplicitEuler"):
             sp.Simulation(scene, integrator).step_derivatives(q, v)
-    step = sp.Simulation(scene, sp.RungeKutta4(DT)).step_derivatives
-    other, *state = scenes.on_plate(LAWS["impact"], BRISTLE)
-    for call, error, said in (
-        (lambda: step(q, v, parameters=["tip.law.stifness"]), NameNotFound, r"law\.stiffness"),
-        (lambda: step(q, v, parameters=["tip.law.stiffness"] * 2), InvalidParameter, "twice"),
-        (lambda: step(q, v, np.zeros(2)), InvalidParameter, "tau"),
-        (lambda: step(q, np.zeros(4)), InvalidParameter, "v has shape"),
-        (lambda: step(q, v, state=other.state(*state)), InvalidParameter, "state of this scene"),
-    ):
-        with pytest.raises(error, match=said):
-            call()
+    with pytest.raises(NameNotFound, match=r"law\.stiffness"):
+        sp.Simulation(scene, sp.RungeKutta4(DT)).step_derivatives(q, v, parameters=["tip.law.x"])
