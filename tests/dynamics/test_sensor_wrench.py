@@ -66,23 +66,14 @@ def read(scene, q, controller, sensors, duration=0.0, **more):
     return sp.Simulation(scene, sp.Adaptive(), sensors).run(q, None, duration, controller, **more)
 
 
-AT = {
-    "mount": BEYOND,
-    "flange": BEYOND,
-    "grip": ("tool",),
-    "finger": ("finger",),
-    "shoulder": tuple(PARTS),
-    "upper": tuple(PARTS),
-    "base": tuple(PARTS),
-}
+ALL = tuple(PARTS)
+AT = {"mount": BEYOND, "flange": BEYOND, "grip": ("tool",), "finger": ("finger",)}
+AT |= {"shoulder": ALL, "upper": ALL, "base": ALL}
 
 
-def rest(scene, q, given, **more):
+def rest(scene, q, given):
     """What a sensor reads of a robot that is held at rest."""
-    result = sp.Simulation(scene, sp.Adaptive(), [given]).run(
-        q, None, 0.0, sp.GravityCompensation(), **more
-    )
-    return result.sensors[given.name].values[0]
+    return read(scene, q, sp.GravityCompensation(), [given]).sensors[given.name].values[0]
 
 
 @pytest.mark.parametrize("lock", [(), ("knuckle",), ("shoulder",)])
@@ -178,18 +169,14 @@ def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
 
 
 def test_a_joint_torque_at_rest_carries_the_weight():
-    model = arm()
     q = np.array([0.4, -0.7])
-    names = ("shoulder", "knuckle")
-    sensors = [sp.JointTorqueSensor(name=name, joint=name) for name in names]
-    result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
-    for name, axis, parts in (
-        ("shoulder", (0.0, 0.6, 0.8), tuple(PARTS)),
-        ("knuckle", (0.0, 1.0, 0.0), ("finger",)),
-    ):
-        wrench = weight(model, q, name, parts)
-        assert abs(result.sensors[name].values[0, 0] - wrench[3:] @ np.array(axis)) < 1e-10
-        assert result.sensors[name].columns == ("torque [N m]",)
+    tip = ("finger",)
+    for name, axis, parts in (("shoulder", [0, 0.6, 0.8], ALL), ("knuckle", [0, 1, 0], tip)):
+        given = sp.JointTorqueSensor(name=name, joint=name)
+        torque = weight(arm(), q, name, parts)[3:] @ axis
+        log = read(sp.Scene(arm()), q, sp.GravityCompensation(), [given]).sensors[name]
+        assert abs(log.values[0, 0] - torque) < 1e-10
+        assert log.columns == ("torque [N m]",)
 
 
 def test_a_push_from_outside_is_felt():

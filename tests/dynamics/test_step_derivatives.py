@@ -13,16 +13,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import differences, models
 from tests.dynamics import scenes
-from tests.dynamics.scenes import (
-    BRISTLES,
-    COULOMB,
-    FRICTIONS,
-    LAWS,
-    STOPS,
-    in_bowl,
-    moving,
-    stuck,
-)
+from tests.dynamics.scenes import COULOMB, FRICTIONS, LAWS, in_bowl, moving
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import two_free_bodies, two_free_state
 from tests.studies import mostly_studies
@@ -110,11 +101,12 @@ def test_a_touching_step(make, law: str, stepper: str) -> None:  # type: ignore[
     assert_step(scene, STEPPERS[stepper], q, v)
 
 
-SCENES = {friction: partial(in_bowl, LAWS["impact"], FRICTIONS[friction]) for friction in BRISTLES}
+IMPACT = LAWS["impact"]
+SCENES = {slip: partial(in_bowl, IMPACT, FRICTIONS[slip]) for slip in scenes.BRISTLES}
 SCENES |= {name: partial(scenes.mimicking, name) for name in MIMIC}
 SCENES["two spheres"] = partial(scenes.balls, "impact", "coulomb")
 SCENES |= {name: partial(scenes.mimicking, name) for name in MIMIC}
-SCENES["joint components"] = partial(in_bowl, LAWS["impact"], COULOMB, joints=STOPS)
+SCENES["joint components"] = partial(in_bowl, LAWS["impact"], COULOMB, joints=scenes.STOPS)
 
 
 @every_stepper
@@ -165,7 +157,7 @@ def test_a_linearly_implicit_step_near_a_touch_is_that_of_its_side(depth: float)
 
 def test_a_state_with_bristles() -> None:
     """One step of the own loop, with what ten steps have stretched; the next step's state moves."""
-    (scene, q, v), state = stuck()
+    (scene, q, v), state = scenes.stuck()
     model, tau = scene.model, np.array([0.3, -0.2, 0.1])
     simulation = sp.Simulation(scene, STEPPERS["semi-implicit"])
     names = [name for name in differences.names_of(scene) if name.endswith(".stiffness")]
