@@ -8,13 +8,8 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import (
-    DataError,
-    Interrupted,
-    InvalidParameter,
-    ResultError,
-    UnitWarning,
-)
+from sphshell_pin import errors
+from sphshell_pin.errors import Interrupted, InvalidParameter, ResultError, UnitWarning
 from sphshell_pin.study.fit import Experiment
 from sphshell_pin.study.fit.data import read_experiment
 from tests import meshes, models
@@ -250,8 +245,15 @@ def read(force, **more):
 
 
 def test_data_that_cannot_be_computed_with_are_named() -> None:
-    with pytest.raises(DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
+    with pytest.raises(errors.DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
         read([1.0, 1e308])
-    with pytest.raises(DataError, match=r"'f.sigma' must be positive .*too small to compute with"):
+    with pytest.raises(
+        errors.DataError, match=r"'f.sigma' must be positive .*too small to compute with"
+    ):
         read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
     assert read(np.ma.masked_greater([1.0, 2.0], 1.5))[0].measured.tolist() == [1.0]
+
+
+def test_masked_elements_are_refused() -> None:
+    with pytest.raises(errors.InvalidShell, match="elements must not be masked"):
+        sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2))
