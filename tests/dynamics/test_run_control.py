@@ -1,6 +1,7 @@
 """How runs start, stop, repeat and are kept: controllers, faults, files, locked joints."""
 
 import os
+import re
 import signal
 import sys
 import threading
@@ -233,18 +234,14 @@ LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 
 def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
     """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
-    arm = robots.load("panda")
-    scene = sp.Scene(arm.model)
-    plate = models.plate()
+    arm, plate = robots.load("panda"), models.plate()
+    scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
     frames = ("panda_link3", "panda_link5", "panda_link7", "panda_hand")
-    where = pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
-    for k, frame in enumerate(frames):
-        for method in ("smooth", "facets"):
-            ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
-            scene.add_contact(
-                ball, plate, placement=where, law=LAW, method=method, name=f"{method}-{k}",
-                friction=sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None,
-            )  # fmt: skip
+    for (k, frame), method in product(enumerate(frames), ("smooth", "facets")):
+        ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
+        friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
+        more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
+        scene.add_contact(ball, plate, placement=where, **more)
     scene.add_contact(sp.Sphere(0.02, frames[0]), plate, frame=frames[2], law=LAW, name="moving")
     scene.add_contact(sp.Sphere(0.02, frames[3]), sp.Sphere(0.03, frames[1]), law=LAW, name="two")
     scene.add_contact(sp.Plane("universe"), plate, frame=frames[3], law=LAW, name="plane")
@@ -294,20 +291,18 @@ class _Enough(Exception):
     ],
 )
 def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> None:
-    scene = sp.Scene(models.ball())
-    simulation = sp.Simulation(scene, integrator)
-
     def stop(_: float) -> None:
         raise _Enough
 
+    simulation, q = sp.Simulation(sp.Scene(models.ball()), integrator), models.free_q([0, 0, 1])
     with warnings.catch_warnings(record=True) as caught, suppress(_Enough):
         warnings.simplefilter("always")
-        simulation.run(scene.neutral, duration=15.0, record_dt=record_dt, progress=stop)
+        simulation.run(q, duration=15.0, record_dt=record_dt, progress=stop)
     told = [str(one.message) for one in caught if "rows" in str(one.message)]
     assert len(told) == bool(rows)
     if told:
         assert rows in told[0]
-        assert "record_dt = 0.002 s" in told[0] or "record_dt = 0.001 s" in told[0]
+        assert re.search(r"record_dt = 0.00[12] s", told[0])
         assert caught[0].filename == __file__
 
 

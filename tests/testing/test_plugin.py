@@ -1,8 +1,6 @@
 """The pytest plugin, in suites of its own: it checks what it should, and is not there otherwise."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -99,9 +97,7 @@ def test_a_suite_that_uses_none_of_it_imports_none_of_it(suite: pytest.Pytester)
         """
     )
     # In a process of its own: this one has it all.
-    command = [sys.executable, "-m", "pytest", *PLUGIN, "-p", "no:cacheprovider"]
-    done = subprocess.run(command, cwd=suite.path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+    suite.runpytest_subprocess(*PLUGIN, "-p", "no:cacheprovider").assert_outcomes(passed=1)
 
 
 def test_the_suite_of_the_page(suite: pytest.Pytester) -> None:
