@@ -96,6 +96,7 @@ def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:
     joints = sp.JointComponents.from_model(model)
     assert set(joints.limits) == {"lift", "left_knuckle_joint"}
     scene = sp.Scene(model, joints=joints)
+    assert "joints that mimic others, exactly" in str(scene.explain())
     result = sp.Simulation(scene, sp.Adaptive(1e-7)).run(
         np.zeros(2), [0.0, 8.0], 1.0, sp.JointPD({"lift": 500.0}, {"lift": 1.0})
     )

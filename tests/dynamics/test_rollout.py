@@ -204,6 +204,7 @@ def stiffness_of(values: object) -> dict[str, object]:
         ({"vary": {"tip.sphere.offset": [0.0, 0.0, 0.0]}}, "(3, 3)"),
         ({"vary": {"tip.placement": [np.eye(4)] * 3}}, "pinocchio.SE3"),
         (law_of(3), "list of 3 values"),
+        (law_of([None] * 2), "must be 3 values, one a run"),
         (law_of([3, 3, 3]), "is FunctionLaw(function)"),
         (law_of({1: 2, 3: 4, 5: 6}), "list of 3 values"),
         ({"vary": {3: [1.0] * 3}}, "map names to n values"),

@@ -201,14 +201,22 @@ def test_a_switch_closes_at_its_threshold_and_opens_below_its_release(integrator
         sp.ContactSwitch(name="plain", contact="ball-plate", threshold=2.0, rate=1000),
         sp.ContactSwitch(name="hysteresis", frame="ball", threshold=2.0, release=1.0, rate=1000),
     ]
+    seen = []
+
+    def tau(t, q, v, contacts, sensors):
+        seen.append(sensors["plain"])
+        return [0.0]
+
     # Half a period of a mass on a spring: the force is v sqrt(k m) sin(sqrt(k/m) t).
-    result = sp.Simulation(scene, integrator, sensors).run([0.05], [-0.04], 0.035)
+    simulation = sp.Simulation(scene, integrator, sensors)
+    result = simulation.run([0.05], [-0.04], 0.035, tau, control_dt=1e-3)
     t = result.sensors["plain"].t
     force = np.clip(4 * np.sin(100 * t), 0, None)
     assert np.array_equal(result.sensors["plain"].values[:, 0], force > 2)
     held = (force > 2) | ((force >= 1) & (t > 0.01) & (t < np.pi / 100))
     assert np.array_equal(result.sensors["hysteresis"].values[:, 0], held)
     assert 0 < (force > 2).sum() < held.sum()
+    assert seen[1:] == [bool(closed) for closed in force[1:-1] > 2]
 
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.RungeKutta4(1e-3)])
