@@ -219,9 +219,9 @@ def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array
     return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
 
 
-def balls(law: str, friction: str) -> State:
+def balls(law: str, friction: str, seed: int = 3, spin: float = 20.0) -> State:
     """The two spheres in touch."""
-    return two_spheres(LAWS[law], FRICTIONS[friction]), *in_touch(3)
+    return two_spheres(LAWS[law], FRICTIONS[friction]), *in_touch(seed, spin=spin)
 
 
 def stuck() -> tuple[State, sp.results.SceneState]:

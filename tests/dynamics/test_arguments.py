@@ -13,6 +13,7 @@ from sphshell_pin import CartesianImpedance, JointPD, Scene, Simulation, Sphere
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.patches import ShellTaxels
 from tests.models import ARM_Q, LAW, add_body, arm, ball, empty, free_q, on_plate, plate
 
 BALL, HIGH, NAN = Sphere(0.05, "ball"), free_q([0, 0, 1]), float("nan")
@@ -137,6 +138,7 @@ def without_a_frame(late):
 
 
 RANGE = sp.JointLimits(-1.0, 1.0, LAW)
+NAMES = np.array(["a", "b"])
 ZEROS, FORGOT = [0, 0, 0], r"did you forget \(\)"
 Call = Callable[[], object]
 REFUSED: list[tuple[str, Call]] = [
@@ -202,6 +204,10 @@ REFUSED: list[tuple[str, Call]] = [
     ("q has shape", lambda: on_plate(ball(), LAW).external_forces(np.zeros(6))),
     ("v has shape", lambda: on_plate(ball(), LAW).external_forces(HIGH, np.zeros(5))),
     ("q has shape", lambda: run(np.zeros(6))),
+    ("q = .* must hold 7 numbers", lambda: at(np.ma.masked_equal(HIGH, 0.0))),
+    ("scale = .* makes the shell too large", lambda: plate().transformed(1e308)),
+    ("name = .* must be a name", lambda: on_plate(ball(), LAW).replace_pair(NAMES, law=LAW)),
+    ("pair = .* must be a name", lambda: ShellTaxels(NAMES)),
     ("v has shape", lambda: run(v=np.zeros(7))),
     ("q = .* finite", lambda: run(HIGH * np.nan)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),

@@ -123,23 +123,6 @@ LOAD = 1e4 * DEEP
 LEVER = 3 * np.pi / 16 * np.sqrt(R * DEEP)
 
 
-@every
-def test_a_spin_dies_out_at_the_moment_limit(integrator) -> None:
-    """M = 3 pi / 16 mu N a: w0 - M t / I; then it sticks, and swings in its bristle."""
-    rate = 0.4 * LOAD * LEVER / INERTIA
-    w0 = 0.05 * rate
-    rows = run(drill(pin.JointModelRZ()), integrator, [0.0], [w0], 0.1, record_dt=1e-3)
-    sliding = (rows.t > 2e-3) & (rows.t < 0.045)
-    late = rows.t > 0.055
-    stretch = 0.4 * LOAD / 1e6 / LEVER  # [rad]
-    swing = stretch * np.sqrt(1e6 * LEVER**2 / INERTIA)
-    assert rows.v[sliding, 0] == pytest.approx(w0 - rate * rows.t[sliding], abs=1.5 * swing)
-    slope = np.polyfit(rows.t[sliding], rows.v[sliding, 0], 1)[0]
-    assert slope == pytest.approx(-rate, rel=2e-3)
-    assert np.ptp(rows.q[late, 0]) < 2.1 * stretch
-    assert np.abs(rows.v[late, 0]).max() < 1.1 * swing
-
-
 def test_force_and_moment_share_the_limit() -> None:
     """Both act against w = v + rho spin n, with mu N together: while sliding they keep its way."""
     scene = drill(pin.JointModelPX(), pin.JointModelRZ())
@@ -152,3 +135,37 @@ def test_force_and_moment_share_the_limit() -> None:
     assert whole[late] == pytest.approx(1.0, rel=2e-3)
     v = 0.5 * (rows.v[1:] + rows.v[:-1])
     assert (moment / force)[late] == pytest.approx((LEVER**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
+
+
+MASS, SPRING, DRAWN, STATIC, DYNAMIC, RADIUS = 1.0, 1e3, 0.01, 0.6, 0.4, 0.02
+
+
+def period() -> float:
+    """With mu_static until it slips and mu_dynamic while it does, it sticks again at rest."""
+    stretch = (STATIC - DYNAMIC) * MASS * 9.81 / SPRING
+    frequency = np.sqrt(SPRING / MASS)
+    slip = 2 / frequency * (np.pi - np.arctan(stretch * frequency / DRAWN))
+    return 2 * stretch / DRAWN + slip
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("v_stribeck", "percent"), [(1e-4, -0.13), (1e-3, 2.7), (3e-3, 5.2), (1e-2, 9.5)]
+)
+def test_the_period_of_stick_slip(v_stribeck: float, percent: float) -> None:
+    friction = sp.BristleFriction(STATIC, DYNAMIC, 1e6, 100.0, v_stribeck)
+    law = sp.ImpactLaw(1e6, 1.0, 300.0, 1e-6)
+    model = models.block(9.81, MASS, RADIUS)
+    scene = models.on_shell(model, models.square(), law, friction, radius=RADIUS)
+
+    def pull(t, q, _v, _contacts):
+        return np.array([SPRING * (DRAWN * t - q[0]), 0.0, 0.0])
+
+    start = np.array([0.0, 0.0, RADIUS - MASS * 9.81 / 1e6])
+    run = sp.Simulation(scene, sp.Adaptive(1e-7, 1e-10)).run(
+        start, np.zeros(3), 3.0, controller=pull, control_dt=2e-4, record_dt=1e-4
+    )
+    fast = run.v[:, 0] > 2 * DRAWN
+    begins = run.t[np.flatnonzero(fast[1:] & ~fast[:-1])]
+    found = 100 * (np.diff(begins)[1:].mean() / period() - 1)
+    assert np.isclose(found, percent, atol=0.15)

@@ -39,17 +39,14 @@ def tree(*joints: pin.JointModel, branches: bool = True) -> pin.Model:
     return model
 
 
+PLAIN = ("FreeFlyer", "RX", "RUBZ", "Spherical", "Planar", "Translation", "PZ")
+
+
 def all_kinds() -> pin.Model:
     axis = np.array([0.36, 0.48, 0.8])
     return tree(
-        pin.JointModelFreeFlyer(),
-        pin.JointModelRX(),
+        *(getattr(pin, f"JointModel{kind}")() for kind in PLAIN),
         pin.JointModelHY(0.3),
-        pin.JointModelRUBZ(),
-        pin.JointModelSpherical(),
-        pin.JointModelPlanar(),
-        pin.JointModelTranslation(),
-        pin.JointModelPZ(),
         pin.JointModelPrismaticUnaligned(axis),
         pin.JointModelRevoluteUnaligned(axis),
         pin.JointModelHelicalUnaligned(axis, -0.2),
@@ -68,13 +65,9 @@ def touching(model: pin.Model, q: Array, compiled: bool) -> sp.Scene:
     frame, data, radius = model.frames[model.nframes - 1], model.createData(), 0.05
     pin.framesForwardKinematics(model, data, q)
     below = data.oMf[model.nframes - 1].translation - [0.0, 0.0, 0.9 * radius]
-    scene.add_contact(
-        sp.Sphere(radius, frame=frame.name),
-        sp.Shell(*meshes.grid_plate(4, 4, 2.0)),
-        placement=pin.SE3(np.eye(3), below),
-        law=sp.HuntCrossleyLaw(1e4, 1.5, 0.1),
-        friction=sp.BristleFriction(0.5, 0.4, 1e3, 1.0, 1e-2),
-    )
+    place, plate = pin.SE3(np.eye(3), below), sp.Shell(*meshes.grid_plate(4, 4, 2.0))
+    law, friction = sp.HuntCrossleyLaw(1e4, 1.5, 0.1), sp.BristleFriction(0.5, 0.4, 1e3, 1.0, 1e-2)
+    scene.add_contact(sp.Sphere(radius, frame.name), plate, "universe", place, law, friction)
     return scene
 
 

@@ -197,28 +197,24 @@ def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
     )
 
 
-@pytest.mark.parametrize("friction", DISCS)
-def test_rates_of_bristles_on_the_ellipses_of_hertz(friction: str) -> None:
-    for name in ELLIPSES:
-        scene, q, v = scenes.on_surface(name, HERTZ, FRICTIONS[friction])
-        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4), turning=1e-2)
+# A scene, its stretches [m], and how well its turning is known.
+ELSEWHERE = {
+    f"{name}, {slip}": (partial(scenes.on_surface, name, HERTZ, FRICTIONS[slip]), 1e-4, 1e-2)
+    for name, slip in product(ELLIPSES, DISCS)
+}
+ELSEWHERE |= {
+    f"two spheres, {slip}": (partial(scenes.balls, "impact", slip, 4, 2.0), 2e-6, turning)
+    for slip, turning in ((one, 0.3 if "rings" in one else 1e-2) for one in scenes.BRISTLES)
+}
+ELSEWHERE |= {name: (partial(scenes.mimicking, name), 1e-5, 1e-6) for name in MIMIC}
+ELSEWHERE["two pairs"] = SCENES["two pairs"], 1e-4, 1e-6
 
 
-@pytest.mark.parametrize("friction", scenes.BRISTLES)
-def test_rates_of_bristles_of_two_spheres(friction: str) -> None:
-    scene = scenes.two_spheres(IMPACT, FRICTIONS[friction])
-    turning = 0.3 if "rings" in friction else 1e-2
-    scenes.assert_rate_jacobian(
-        scene, *scenes.in_touch(4, spin=2.0), scenes.stretched(scene, 2e-6), turning=turning
-    )
-
-
-def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
-    scene, q, v = SCENES["two pairs"]()
-    scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4))
-    for name in MIMIC:
-        scene, q, v = scenes.mimicking(name)
-        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-5))
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_rates_of_bristles_of_other_scenes(name: str) -> None:
+    make, stretch, turning = ELSEWHERE[name]
+    scene, q, v = make()
+    scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, stretch), turning=turning)
 
 
 def test_bristles_of_a_state() -> None:

@@ -8,11 +8,11 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
-from tests import differences, meshes, models
-from tests.contact.smooth.surfaces import shell_of
+from tests import meshes, models
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.dynamics import scenes
 from tests.dynamics.scenes import assert_rate_jacobian
+from tests.dynamics.test_derivatives import assert_derivatives
 from tests.models import ball, free_q, on_plate
 
 KAPPA = 2e4  # modulus / thickness [Pa/m]
@@ -87,42 +87,6 @@ def test_local_dissipation() -> None:
         assert scene.external_forces(q, v)[1].linear[2] == pytest.approx(
             share * elastic, abs=1e-9 * elastic
         )
-
-
-def torques(scene: sp.Scene, q, v, tau):  # type: ignore[no-untyped-def]
-    """The contact forces as joint torques (nv,)."""
-    model, zero = scene.model, np.zeros(scene.model.nv)
-    data = model.createData()
-    free = np.array(pin.rnea(model, data, q, zero, zero))
-    return free - pin.rnea(model, data, q, zero, zero, scene.external_forces(q, v))
-
-
-def assert_derivatives(scene: sp.Scene, q, v) -> None:  # type: ignore[no-untyped-def]
-    """By q and v; where the pressed area has kinks, other numbers are differenced less well."""
-    moves = differences.moves(scene, q, v)
-    for letter, by in zip("qv", scene.contact_derivatives(q, v), strict=True):
-        for k, column in enumerate(by.T):
-            moved, scale, _ = moves[f"{letter}.{k}"]
-            f = lambda x, moved=moved: torques(*moved(x))  # noqa: E731
-            assert differences.off(column, f, scale, floor=1e-2 * np.abs(by).max()) <= 1e-6
-
-
-PLACES = {
-    "dome": lambda: (shell_of("dome", 0.6), [1.0, 2.0, 4.3]),
-    "cube": lambda: (edged("cube"), [2.3, 2.2, 2.6]),
-    "border": lambda: (edged("cap"), [1.9, 0.3, 0.5]),
-}
-
-
-@pytest.mark.parametrize("friction", [None, COULOMB, BRISTLE], ids=["free", "coulomb", "bristle"])
-@pytest.mark.parametrize("law", [LAW, DAMPED], ids=["elastic", "damped"])
-@pytest.mark.parametrize("place", list(PLACES))
-def test_derivatives(place: str, law: sp.FoundationLaw, friction) -> None:
-    shell, center = PLACES[place]()
-    scene = free_ball(shell, law, friction, gravity=9.81)
-    rng = np.random.default_rng(2)
-    q = pin.integrate(scene.model, free_q(center), np.r_[np.zeros(3), rng.normal(size=3)])
-    assert_derivatives(scene, q, 0.3 * rng.normal(size=6))
 
 
 def test_bristle_holds_at_the_center_of_pressure() -> None:

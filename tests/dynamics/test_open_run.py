@@ -82,16 +82,6 @@ def test_a_push_gives_its_impulse_and_its_work(integrator) -> None:
 
 
 @every
-def test_a_push_off_the_centre_turns_an_arm(integrator) -> None:
-    """One hinge about z, arm L: the angular acceleration is F L / I."""
-    run = opened(sp.Scene(hinge(0.4)), integrator, [0.0], None)
-    run.push("arm", [0.0, 1.0, 0.0])
-    run.advance(0.01)
-    # The force keeps its direction in the world: cos(angle) is 1 to 1e-7 here.
-    assert run.snapshot().v[0, 0] == pytest.approx(0.4 / 0.2 * run.time, rel=1e-6)
-
-
-@every
 def test_a_damped_pull_follows_its_closed_form(integrator) -> None:
     """x'' + 2 w x' + w^2 x = 0 from rest at x = s: s (1 + w t) exp(-w t), a free ball's center."""
     mass, rate, stretch = 2.0, 12.0, np.array([0.3, -0.1, 0.2])

@@ -1,10 +1,13 @@
 """How runs start, stop, repeat and are kept: controllers, faults, files, locked joints."""
 
 import os
+import re
 import signal
 import sys
 import threading
-from dataclasses import replace
+import warnings
+from contextlib import suppress
+from dataclasses import astuple, replace
 from itertools import product
 from pathlib import Path
 
@@ -13,8 +16,10 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import errors
+from sphshell_pin import errors, robots
 from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
+from sphshell_pin.dynamics.run import advance
+from sphshell_pin.dynamics.scene.explain import explain_pairs
 from tests import models
 from tests.results import assert_same_bits
 from tests.texts import DATA
@@ -130,17 +135,15 @@ def test_an_error_in_a_controller_comes_through() -> None:
 
 def test_rows_of_a_result() -> None:
     result = bouncing().run(*START, 0.3, record_dt=1e-3)
-    assert result.t[0] == 0.0
-    assert result.t[-1] == pytest.approx(0.3, abs=1e-12)
+    assert (result.t[0], result.t[-1]) == pytest.approx((0.0, 0.3), abs=1e-12)
     assert np.array_equal(result.q[0], START[0])
     assert np.array_equal(result.v[0], START[1])
-    log = result.contacts
+    log, stats = result.contacts, result.stats.pairs["ball-plate"]
     assert np.array_equal(log.t, result.t[log.row])
-    kinds = [e.kind for e in result.events if e.pair == "ball-plate"]
+    kinds = [e.kind for e in result.events]
     assert kinds[:2] == ["touch", "lift_off"]
     drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
     assert result.events[0].t == pytest.approx(drop, abs=2e-4)
-    stats = result.stats.pairs["ball-plate"]
     assert stats.touches == kinds.count("touch")
     assert stats.max_depth >= log.depth.max() - 1e-12
     assert stats.peak_force >= log.normal_force.max() - 1e-9
@@ -224,3 +227,98 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
     a, b = (models.run(one, sp.RungeKutta4(1e-3), *start, 0.4) for one in (by_hand, scene))
     assert len(a.contacts.depth) > 0
     assert_same_bits(a, b)
+
+
+LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
+
+
+def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
+    """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
+    arm, plate = robots.load("panda"), models.plate()
+    scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
+    frames = ("panda_link3", "panda_link5", "panda_link7", "panda_hand")
+    for (k, frame), method in product(enumerate(frames), ("smooth", "facets")):
+        ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
+        friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
+        more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
+        scene.add_contact(ball, plate, placement=where, **more)
+    scene.add_contact(sp.Sphere(0.02, frames[0]), plate, frame=frames[2], law=LAW, name="moving")
+    scene.add_contact(sp.Sphere(0.02, frames[3]), sp.Sphere(0.03, frames[1]), law=LAW, name="two")
+    scene.add_contact(sp.Plane("universe"), plate, frame=frames[3], law=LAW, name="plane")
+    scene.add_contact_source(nowhere, frames[0], frames[1], law=LAW, name="own")
+    return scene, np.asarray(arm.q0)
+
+
+def nowhere(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+
+
+def test_the_figures_of_pairs_do_not_depend_on_the_other_pairs() -> None:
+    scene, q = of_all_kinds()
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        state = scene.check_state(q + rng.normal(scale=0.2, size=q.size), rng.normal(size=q.size))
+        together = explain_pairs(scene, *state)
+        for pair, figures in zip(scene.pairs, together, strict=True):
+            (alone,) = explain_pairs(scene.with_pairs((pair,)), *state)
+            np.testing.assert_equal(astuple(figures), astuple(alone))
+
+
+def test_what_is_kept_of_a_pair_goes_with_it() -> None:
+    scene = sp.Scene(models.ball())
+    scene.add_contact(sp.Sphere(0.006, "ball"), models.plate(), law=LAW, name="c")
+    q = models.free_q([0.0, 0.0, 0.006])
+    before = scene.explain(q).pairs[0]
+    scene.replace_pair("c", law=sp.HuntCrossleyLaw(1e8, 1.5, 0.5))
+    after = scene.explain(q).pairs[0]
+    assert after.modelled != before.modelled
+    assert after.contact_time < before.contact_time
+
+
+class _Enough(Exception):
+    """Ends a run at its first glance."""
+
+
+@pytest.mark.parametrize(
+    ("integrator", "record_dt", "rows"),
+    [
+        (sp.SemiImplicitEuler(1e-5), None, "1.5e+06 rows"),
+        (sp.SemiImplicitEuler(1e-5), 1e-7, "1.5e+06 rows"),
+        (sp.Adaptive(), 1e-6, "1.5e+07 rows"),
+        (sp.SemiImplicitEuler(1e-5), 1e-3, ""),
+        (sp.SemiImplicitEuler(2e-5), None, ""),
+        (sp.Adaptive(), None, ""),
+    ],
+)
+def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> None:
+    def stop(_: float) -> None:
+        raise _Enough
+
+    simulation, q = sp.Simulation(sp.Scene(models.ball()), integrator), models.free_q([0, 0, 1])
+    with warnings.catch_warnings(record=True) as caught, suppress(_Enough):
+        warnings.simplefilter("always")
+        simulation.run(q, duration=15.0, record_dt=record_dt, progress=stop)
+    told = [str(one.message) for one in caught if "rows" in str(one.message)]
+    assert len(told) == bool(rows)
+    if told:
+        assert rows in told[0]
+        assert re.search(r"record_dt = 0.00[12] s", told[0])
+        assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("limit", ["_MANY_ROWS", "_MANY_BYTES"])
+def test_rows_of_error_control_are_announced_once_seen(limit: str, monkeypatch) -> None:
+    monkeypatch.setattr(advance, limit, 5)
+    scene = sp.Scene(models.ball())
+    with pytest.warns(sp.errors.SetupWarning, match=r"rows by t = .*record_dt = 0.001 s") as caught:
+        sp.Simulation(scene, sp.Adaptive(1e-8)).run(scene.neutral, duration=10.0)
+    assert [one.filename for one in caught] == [__file__]
+
+
+def test_a_run_whose_rows_fill_the_memory_ends_with_its_result(monkeypatch) -> None:
+    sizes = iter((0.0, 0.0, 1e18))
+    monkeypatch.setattr(advance, "_peak_memory", lambda: next(sizes))
+    scene = sp.Scene(models.ball())
+    with pytest.raises(sp.errors.RowsFillMemory, match=r"rows fill 1e\+09 GB") as caught:
+        sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(scene.neutral, duration=60.0)
+    assert 0 < caught.value.result.t[-1] == caught.value.t < 60

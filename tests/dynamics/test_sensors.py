@@ -99,15 +99,15 @@ def noisy(**more):
 
 
 def test_the_same_seed_gives_the_same_bits():
-    def values(sensor, **more):
-        result = slider(sp.Adaptive(), [sensor]).run([0.0], None, 0.5, sine(3.0), **more)
-        return result.sensors["wrist"].values
+    def values(seed, **more):
+        simulation = slider(sp.Adaptive(), [noisy(seed=seed)])
+        return simulation.run([0.0], None, 0.5, sine(3.0), **more).sensors["wrist"].values
 
-    first = values(noisy(seed=4))
-    assert np.array_equal(first, values(noisy(seed=4)))
+    first = values(4)
+    assert np.array_equal(first, values(4))
     # It is that of the sample, however the rows are recorded.
-    assert np.array_equal(first, values(noisy(seed=4), record_dt=0.1))
-    assert not np.array_equal(first, values(noisy(seed=5)))
+    assert np.array_equal(first, values(4, record_dt=0.1))
+    assert not np.array_equal(first, values(5))
     assert abs(first[:, :2].std() - 0.5) < 0.05
     assert abs(first[:, 3:].std() - 0.1) < 0.01
 
@@ -134,16 +134,14 @@ def test_sensors_vary_from_run_to_run():
         for name, log in alone.run([0.0], None, 0.05).sensors.items():
             assert np.array_equal(log.values, result.sensors[name].values)
             assert np.array_equal(log.t, result.sensors[name].t)
-    assert rollout.varied["sensors.wrist.seed"] == list(range(3))
-    table = rollout.to_dataframe()
-    assert table["sensors.torque.delay"].tolist() == [0.0, 0.01, 0.02]
-    assert table["sensors.wrist.seed"].tolist() == [0, 1, 2]
-    with pytest.raises(NameNotFound, match=r"no parameter 'sensors.wrist.frame'"):
-        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.frame": ["a"]})
-    with pytest.raises(InvalidParameter, match=r"of run 1'?.* = -1 cannot be taken: rate"):
-        simulation.rollout([0.0], None, 0.05, vary={"sensors.wrist.rate": [1, -1]})
-    with pytest.raises(InvalidParameter, match="must be 2 values, one a run"):
-        simulation.rollout([[0.0], [1.0]], None, 0.05, vary={"sensors.wrist.seed": [1]})
+    for key, values in vary.items():
+        assert list(rollout.varied[key]) == rollout.to_dataframe()[key].tolist() == list(values)
+    for wrong, error, said in (
+        ({"frame": ["a"]}, NameNotFound, r"no parameter 'sensors.wrist.frame'"),
+        ({"rate": [1, -1]}, InvalidParameter, r"of run 1'?.* = -1 cannot be taken: rate"),
+    ):
+        with pytest.raises(error, match=said):
+            simulation.rollout([0.0], vary={f"sensors.wrist.{k}": one for k, one in wrong.items()})
 
 
 def test_readings_saturate_at_the_range():
@@ -203,14 +201,22 @@ def test_a_switch_closes_at_its_threshold_and_opens_below_its_release(integrator
         sp.ContactSwitch(name="plain", contact="ball-plate", threshold=2.0, rate=1000),
         sp.ContactSwitch(name="hysteresis", frame="ball", threshold=2.0, release=1.0, rate=1000),
     ]
+    seen = []
+
+    def tau(t, q, v, contacts, sensors):
+        seen.append(sensors["plain"])
+        return [0.0]
+
     # Half a period of a mass on a spring: the force is v sqrt(k m) sin(sqrt(k/m) t).
-    result = sp.Simulation(scene, integrator, sensors).run([0.05], [-0.04], 0.035)
+    simulation = sp.Simulation(scene, integrator, sensors)
+    result = simulation.run([0.05], [-0.04], 0.035, tau, control_dt=1e-3)
     t = result.sensors["plain"].t
     force = np.clip(4 * np.sin(100 * t), 0, None)
     assert np.array_equal(result.sensors["plain"].values[:, 0], force > 2)
     held = (force > 2) | ((force >= 1) & (t > 0.01) & (t < np.pi / 100))
     assert np.array_equal(result.sensors["hysteresis"].values[:, 0], held)
     assert 0 < (force > 2).sum() < held.sum()
+    assert seen[1:] == [bool(closed) for closed in force[1:-1] > 2]
 
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.RungeKutta4(1e-3)])
@@ -236,16 +242,18 @@ def test_an_open_run_gives_the_readings_of_its_pieces():
     assert np.array_equal(np.concatenate([one.t for one in parts]), whole.t)
 
 
-def test_an_unknown_sensor_is_named_in_a_controller():
-    def tau(t, q, v, contacts, sensors):
-        return [sensors["wrist"][0]]
-
-    with pytest.raises(NameNotFound, match=r"no sensor 'wrist'.*torque"):
-        slider(sp.SemiImplicitEuler(1e-3), [torque()]).run([0.0], None, 0.01, tau)
-    with pytest.raises(NameNotFound, match="no sensor 'wrist'"):
-        slider(sp.SemiImplicitEuler(1e-3), []).run([0.0], None, 0.01, tau)
-    with pytest.raises(InvalidParameter, match="control_dt = None must be given for a controller"):
-        slider(sp.Adaptive(), [torque()]).run([0.0], None, 0.01, tau)
+@pytest.mark.parametrize(
+    ("integrator", "sensors", "error", "said"),
+    [
+        (sp.SemiImplicitEuler(1e-3), [torque()], NameNotFound, r"no sensor 'wrist'.*torque"),
+        (sp.SemiImplicitEuler(1e-3), [], NameNotFound, "no sensor 'wrist'"),
+        (sp.Adaptive(), [torque()], InvalidParameter, "control_dt = None must be given for a con"),
+    ],
+)
+def test_what_a_controller_cannot_read_is_named(integrator, sensors, error, said):
+    wrong = lambda t, q, v, contacts, sensors: sensors["wrist"]  # noqa: E731
+    with pytest.raises(error, match=said):
+        slider(integrator, sensors).run([0.0], None, 0.01, wrong)
 
 
 def two_sensors():

@@ -13,15 +13,17 @@ from sphshell_pin import testing
 from sphshell_pin.errors import SetupWarning
 from tests.contact.test_planes import pose, scene_of
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_foundation_on_plane import (
+from tests.dynamics.test_planes import (
     BOX,
     FRICTIONS,
     SPUN,
     assert_at_rest,
     box,
     fallen,
+    over_plane,
+    reach_of,
+    touching,
 )
-from tests.dynamics.test_planes import over_plane, reach_of, touching
 from tests.meshes import cube, grid_plate
 from tests.models import linear_law
 

@@ -11,19 +11,9 @@ import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import DeepStart
 from tests import models
-from tests.dynamics.scenes import (
-    FRICTIONS,
-    LAWS,
-    OFFSET,
-    ONE,
-    OTHER,
-    OTHER_OFFSET,
-    TWO,
-    R,
-    in_touch,
-    two_bodies,
-    two_spheres,
-)
+from tests.dynamics.scenes import FRICTIONS, LAWS, ONE, TWO, in_touch, two_bodies, two_spheres
+
+R, OTHER = ONE.radius, TWO.radius
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -47,7 +37,7 @@ def test_depth_normal_and_point_have_closed_forms(turned: bool) -> None:
 
 def test_two_spheres_with_one_center_are_pushed_along_some_normal() -> None:
     scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
-    q = np.concatenate([models.free_q(-np.array(OFFSET)), models.free_q(-np.array(OTHER_OFFSET))])
+    q = np.concatenate([models.free_q(-np.array(ONE.offset)), models.free_q(-np.array(TWO.offset))])
     found = scene.contacts(q)
     assert np.isclose(np.linalg.norm(found.normal_world[0]), 1.0)
     assert found.depth[0] == R + OTHER
@@ -131,7 +121,7 @@ def test_a_ball_agrees_with_its_fine_mesh(friction: str) -> None:
     shell = sp.Shell.from_geometry(ball, chord_error=1e-3 * OTHER)
     meshed = sp.Scene(two_bodies())
     law = LAWS["hunt-crossley"]
-    placement = pin.SE3(np.eye(3), np.array(OTHER_OFFSET))
+    placement = pin.SE3(np.eye(3), np.array(TWO.offset))
     meshed.add_contact(ONE, shell, "two", placement, law=law, friction=FRICTIONS[friction])
     closed = two_spheres(law, FRICTIONS[friction])
     for seed in range(5):
