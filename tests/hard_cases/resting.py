@@ -1,6 +1,6 @@
 """Balls that rest on several places.
 
-In a groove, in a cone that it touches along a ring, on eight spikes.
+In a groove, on eight spikes.
 """
 
 import math
@@ -74,83 +74,6 @@ def wedged() -> Verdicts:
                     continue
                 for law, a, b in zip(laws, found, right, strict=True):
                     yield compare("wedge", tried, law, float(b), float(a), 1e-6)
-
-
-def cone(half_angle: float, columns: int, rows: int, flat: bool) -> sp.Shell:
-    """Return a seat that opens upward, round z: with its own normals, or of flat facets."""
-    turn, rho = 2 * np.pi * np.arange(columns) / columns, np.linspace(0.4, 1.6, rows + 1) * RADIUS
-    cos, sin = math.cos(half_angle), math.sin(half_angle)
-    out = np.stack([np.cos(turn), np.sin(turn), np.full(columns, cos / sin)], axis=1)
-    vertices = (rho[:, None, None] * out).reshape(-1, 3)
-    normals = np.tile(out * [-cos, -cos, sin * sin / cos], (rows + 1, 1))
-    first = (np.arange(rows)[:, None] * columns + np.arange(columns)).ravel()
-    second = first // columns * columns + (first + 1) % columns
-    quads = np.stack([first, first + columns, second + columns, second], axis=1)
-    if flat:
-        return sp.Shell(vertices, quads, crease_angle=0.0)
-    # As bent elements: on the exact cone the radial force would jump at the axis.
-    return sp.Shell(vertices, quads, normals=normals, faces=False)
-
-
-def ring_depth(half_angle: float, columns: int, flat: bool, stiffness: float) -> float:
-    """Return by how much the ball at rest overlaps the round cone, r - z sin a [m].
-
-    A ring of contact counts once: k depth sin a = m g, but for the sum of what the bent elements'
-    minima and the saddles between them differ by. Of n flat facets the ball touches each, and
-    between them n saddles, of which the highest n - 1 count:
-    k (n depth_f sin f - (n - 1) depth sin a) = m g, where tan f = tan a cos(pi / n) is the facet's
-    own angle.
-    """
-    a = half_angle
-    if not flat:
-        return WEIGHT / (stiffness * math.sin(a))
-    f = math.atan(math.tan(a) * math.cos(math.pi / columns))
-    # depth_f = r - z sin f, depth = r - z sin a: linear in z.
-    n, sin_f, sin_a = columns, math.sin(f), math.sin(a)
-    z = (RADIUS * (n * sin_f - (n - 1) * sin_a) - WEIGHT / stiffness) / (
-        n * sin_f**2 - (n - 1) * sin_a**2
-    )
-    return RADIUS - z * sin_a
-
-
-def seated(integrator, columns, flat, free):
-    """Let a ball settle in a cone; return its depth, what is right, the force up, and how far
-    from the axis it is [m]. `free`: it may leave the axis.
-    """
-    a = math.radians(40.0)
-    depth = 0.05 * RADIUS
-    stiffness = WEIGHT / (depth * math.sin(a))
-    right = ring_depth(a, columns, flat, stiffness)
-    law = damped(stiffness, 2 * math.sqrt(stiffness * MASS))
-    model = models.block(GRAVITY, MASS) if free else models.slider(GRAVITY, MASS)
-    height = (RADIUS - 0.9 * right) / math.sin(a)
-    q = np.array([1e-5 * RADIUS, 0.0, height]) if free else np.array([height])
-    shell = cone(a, columns, max(columns // 8, 2), flat)
-    # Times of decay: as many as the error of the forces asks for.
-    duration = (20 if free else 50) * math.sqrt(depth / GRAVITY)
-    result = rest(model, shell, law, q, integrator, duration)
-    last = result.contacts.row == len(result.t) - 1
-    up = float(result.contacts.force_world[last, 2].sum())
-    aside = float(np.hypot(*result.q[-1, :2])) if free else 0.0
-    return RADIUS - float(result.q[-1, -1]) * math.sin(a), right, up, aside
-
-
-@case("ball in a cone, touched along a ring", slow=True)
-def coned() -> Verdicts:
-    for integrator in (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3)):
-        for columns, flat, bound in ((64, True, 1e-6), (64, False, 5e-3)):
-            depth, right, up, _ = seated(integrator, columns, flat, free=False)
-            surface = "flat facets" if flat else "columns of bent elements"
-            tried = f"{type(integrator).__name__}, {columns} {surface}, on the axis"
-            law = "64 contacts less 63 saddles" if flat else "k depth sin a = m g"
-            yield compare("cone", tried, law, right, depth, bound)
-            yield compare("cone", tried, "forces up = m g", WEIGHT, up, 1e-6)
-    # Beside the axis the force jumps where links of the ring tie: the steps must resolve that.
-    integrator = sp.LinearlyImplicitEuler(1e-4)
-    depth, right, _, aside = seated(integrator, 64, False, free=True)
-    tried = f"{type(integrator).__name__}, 64 columns, free"
-    yield compare("cone", tried, "k depth sin a = m g", right, depth, 5e-3)
-    yield at_most("cone", tried, "stays on the axis, of the depth", aside / right, 0.05)
 
 
 SPIKES = 8

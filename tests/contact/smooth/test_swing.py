@@ -38,12 +38,6 @@ def test_the_period_is_that_of_the_exact_bowl() -> None:
     )
 
 
-def test_crossings_of_a_cosine() -> None:
-    t = np.linspace(0, 2.1, 2101)
-    found = swing.downward_crossings(t, np.cos(2 * np.pi * t), -2 * np.pi * np.sin(2 * np.pi * t))
-    assert found == pytest.approx([0.25, 1.25], abs=1e-12)
-
-
 @pytest.mark.parametrize("exact_normals", [True, False])
 @pytest.mark.parametrize("side", BARS)
 def test_period_and_energy(side: float, exact_normals: bool) -> None:
