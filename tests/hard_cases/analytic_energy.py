@@ -100,10 +100,8 @@ def top() -> Verdicts:
         title = name.format(integrator.__name__)
         yield compare(title, tried, "error ~ dt^p", order, seen, 0.1, scale=1.0)
     for integrator, span in analytic_impact.BY_TOLERANCE:
-        power, last = analytic_impact.order_by_tolerance(top_error, integrator, span)
-        title = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
-        yield analytic_impact.falls(title, tried, power)
-        yield at_most(f"{integrator.__name__}({span[1]:g}) [rad]", tried, "0", last, 1e2 * span[1])
+        unit = tried, "0", " [rad]"
+        yield from analytic_impact.by_tolerance(top_error, integrator, span, *unit)
 
 
 # What energy and momentum of a tumbling body may change by.

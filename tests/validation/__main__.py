@@ -11,7 +11,7 @@ import time
 
 from benchmarks.measured import FOLDER, Measured, write
 from sphshell_pin.study.report.contents import Finding
-from tests.validation.cases import NOT_FOUND, Case, Outcome, collect, explanations
+from tests.validation.cases import NOT_FOUND, Case, Outcome, collect
 from tests.validation.pictures import draw
 
 PICTURES = FOLDER.parent / "pictures" / "validation"
@@ -65,7 +65,7 @@ def section(one: Case, found: Outcome) -> Measured:
         one.title,
         pictures=[(f"validation/{one.key}.png", one.caption)],
         table=Measured.of(found.tables[0]).table if found.tables else (),
-        notes=[*texts, *found.notes, *explanations(found)],
+        notes=[*texts, *found.notes, *found.explanations],
     )
 
 

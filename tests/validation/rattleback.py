@@ -13,9 +13,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of
-from tests.validation.cases import Outcome, case
+from tests.validation.cases import Outcome, case, within
 from tests.validation.pictures import Panel
 
 AXES = np.array([0.2, 0.03, 0.02])  # [m]
@@ -119,11 +118,11 @@ def rattleback() -> Outcome:
         ours = spin_on_plane(start, duration)
         error = abs(last_zero(*ours[:2]) - zeros[-1])
         what = f"when the spin of {start:+g} rad/s is zero for the last time, {zeros[-1]:.4g} s"
-        findings.append(Finding(f"zero_{start:+g}", what, error, "s", aim=0.03))
+        findings += within(0.03, (what, error), unit="s")
         lines = [("sp.Plane", *ours[:2])]
         theory = [("rigid rolling", t, rigid)]
         panels.append(Panel("time [s]", "spin [rad/s]", (), lines, theory))
         lost = ours[2] / (0.5 * INERTIA[2, 2] * start**2)
         what = f"energy lost from {start:+g} rad/s, of that of the spin"
-        findings.append(Finding(f"lost_{start:+g}", what, lost, aim=0.02))
+        findings += within(0.02, (what, lost))
     return Outcome(findings, panels)

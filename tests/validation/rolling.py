@@ -67,8 +67,8 @@ def turntable() -> Outcome:
     error = max(abs(seen / ratio - 1) for seen in ratios)
     findings = within(
         1e-4,
-        ("ratio", "orbit over table, largest error relative to 2/7", error),
-        ("circle", "largest distance of a path from its circle, over the radius", max(misses)),
+        ("orbit over table, largest error relative to 2/7", error),
+        ("largest distance of a path from its circle, over the radius", max(misses)),
     )
     panel = Panel("x [mm]", "y [mm]", (), ours, theory, equal=True)
     return Outcome(findings, [panel])
@@ -86,9 +86,9 @@ def golf_ball() -> Outcome:
     bobbing = "frequency of bobbing over that of the orbit, error relative to sqrt(2/7)"
     fall = "height, largest distance from the closed form, over the depth of the fall"
     findings = [
-        *within(1e-4, ("ratio", bobbing, run.ratio / given["ratio"] - 1)),
-        *within(1e-3, ("height", fall, np.abs(height - exact).max() / (2 * run.swing))),
-        *within(1e-4, ("lost", "speed around that is lost in three swings", run.lost)),
+        *within(1e-4, (bobbing, run.ratio / given["ratio"] - 1)),
+        *within(1e-3, (fall, np.abs(height - exact).max() / (2 * run.swing))),
+        *within(1e-4, ("speed around that is lost in three swings", run.lost)),
     ]
     ours, form = ("ours", t, 1e3 * height), ("closed form", t, 1e3 * exact)
     panel = Panel("time [s]", "height over the rim [mm]", (), [ours], [form])
@@ -128,13 +128,11 @@ def curved_track() -> Outcome:
     damping = "amplitudes with rolling resistance, largest distance from {}, over the first"
     straight, lost = (np.abs(heights - one).max() / heights[0] for one in (line(count), expected))
     findings = [
-        *within(0.005 / published, ("force", turned, force[turning] / published - 1)),
-        *within(
-            1e-4, ("period", "period, relative to the closed form", run.period / run.expected - 1)
-        ),
-        *within(1e-3, ("forces", way, off)),
-        *within(0.01, ("linear", damping.format("a straight line"), straight)),
-        *within(1e-3, ("loss", damping.format("the closed form"), lost)),
+        *within(0.005 / published, (turned, force[turning] / published - 1)),
+        *within(1e-4, ("period, relative to the closed form", run.period / run.expected - 1)),
+        *within(1e-3, (way, off)),
+        *within(0.01, (damping.format("a straight line"), straight)),
+        *within(1e-3, (damping.format("the closed form"), lost)),
     ]
     panels = [
         Panel(
