@@ -73,11 +73,6 @@ def free_body(moments: tuple[float, float, float]) -> pin.Model:
     return model
 
 
-def rotation(vector: Array) -> Array:
-    turn: Array = pin.exp3(vector)
-    return turn
-
-
 def top_error(integrator: object) -> float:
     """Return how far a free symmetric top is from its closed form after 0.1 s [rad]."""
     first, third, end = 3e-5, 5e-5, 0.1
@@ -87,7 +82,7 @@ def top_error(integrator: object) -> float:
     q = sp.Simulation(scene, integrator).run(q0, v0, end).q[-1]
     momentum = np.array([first, first, third]) * spin
     about_axis = np.array([0.0, 0.0, (1 - third / first) * spin[2]])
-    exact = rotation(momentum / first * end) @ rotation(about_axis * end)
+    exact = pin.exp3(momentum / first * end) @ pin.exp3(about_axis * end)
     return float(np.linalg.norm(pin.log3(exact.T @ pin.Quaternion(q[3:7]).matrix())))
 
 
