@@ -8,7 +8,6 @@ files of another folder, in millimeters.
 import os
 from dataclasses import dataclass
 from functools import cache, partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -29,8 +28,6 @@ WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 FOLDER = os.environ.get("SPHSHELL_FOLDER")
-
-LONG_WALKS = int(os.environ.get("SPHSHELL_WALKS", "1"))
 
 # The others are studies.
 SOME = {
@@ -186,28 +183,6 @@ def steepest_between(find, start, end, width):
     )[:2]
 
 
-def roll(some: Spheres, i: int, rng: np.random.Generator, length: float, depth: float):
-    """Centres (n, 3) of sphere i, a tenth of a radius apart, as it rolls `depth` deep over the
-    surface for `length`, both in radii; it turns back where it would leave the surface."""
-    radius, center = some.radii[i], some.centers[i]
-    along, path = rng.normal(size=3), []
-    for _ in range(round(10 * length)):
-        found = some.shell.contacts(center, radius, method="smooth")
-        if not len(found):
-            break
-        normal = found.normal[0]
-        along = along - along @ normal * normal
-        if np.linalg.norm(along) < 1e-6:
-            along = np.cross(normal, rng.normal(size=3))
-        along /= np.linalg.norm(along)
-        center = center + (found.depth[0] - depth * radius) * normal
-        path.append(center)
-        center = center + 0.1 * radius * along
-        if not len(some.shell.contacts(center, radius, method="smooth")):
-            center, along = path[-1], rng.normal(size=3)
-    return np.array(path)
-
-
 def beside(some: Spheres):
     """1e-9 r further; many stand exactly over sides and corners."""
     rng = np.random.default_rng(1)
@@ -223,16 +198,7 @@ def walks(some: Spheres):
         yield i, look, *steepest_between(look, np.zeros(3), move, 1e-9 * some.radii[i])
 
 
-def long_walks(some: Spheres):
-    """Over 30 radii at a twentieth of one; SPHSHELL_WALKS=100 takes more than the usual walk."""
-    rng = np.random.default_rng(3)
-    for i in rng.integers(COUNT, size=LONG_WALKS):
-        look = partial(some.shell.contacts, radius=some.radii[i], method="smooth")
-        for start, end in pairwise(roll(some, i, rng, 30.0, 0.05)):
-            yield i, look, *steepest_between(look, start, end, 1e-9 * some.radii[i])
-
-
-@pytest.mark.parametrize("ways", [beside, walks, long_walks])
+@pytest.mark.parametrize("ways", [beside, walks])
 @pytest.mark.parametrize("name", cases(CROSSED))
 def test_potential_does_not_jump(name: str, ways) -> None:
     """Between two centres that are near each other."""

@@ -46,12 +46,3 @@ def test_period_and_energy(side: float, exact_normals: bool) -> None:
     period_bar, energy_bar = BARS[side]
     assert row.rms <= period_bar / BETTER
     assert row.energy <= energy_bar / BETTER
-
-
-def test_swing_along_edges() -> None:
-    """Two mirror planes of the mesh, full of edges and vertices, are the planes of the swings."""
-    scene = swing.mesh_scene(swing.bowl(0.3, np.eye(3)))
-    row = swing.measure(scene, (0.0, np.pi / 2), swing.DT, PERIODS)
-    period_bar, energy_bar = BARS[0.3]
-    assert row.rms <= period_bar / BETTER
-    assert row.energy <= energy_bar / BETTER
