@@ -121,24 +121,6 @@ def test_spheres_and_tori_are_exact() -> None:
         assert_derivatives(scene, q, np.array([0.1, -0.2, -0.1, 1.0, 2.0, -3.0]), tolerance=1e-5)
 
 
-def test_limit_of_large_spheres() -> None:
-    """Forces, points and normals are those of a sphere of 1 km, to what its radius leaves."""
-    axes = np.array([0.06, 0.04, 0.03])
-    shell = egg(16, axes)
-    scene = scene_of(shell)
-    large = sp.Scene(scene.model)
-    ball = sp.Sphere(1e4, "universe", (0.3, -0.2, -1e4))
-    large.add_contact(ball, shell, "body", law=linear_law(1e4))
-    for rotation in rotations(10, 4):
-        q = pose(rotation, support(axes, rotation) - 1e-4)
-        ours, theirs = scene.contacts(q), large.contacts(q)
-        assert ours.depth == pytest.approx(theirs.depth, abs=1e-7)
-        assert ours.normal_world == pytest.approx(theirs.normal_world, abs=1e-3)
-        lowest = ours.point_world + ours.depth * ours.normal_world
-        assert lowest == pytest.approx(theirs.point_world, abs=1e-3)
-        assert ours.normal_force == pytest.approx(theirs.normal_force, rel=1e-3)
-
-
 def test_flat_on_flat_is_one_contact_in_the_middle() -> None:
     """A level face, and an edge that lies level, crowned by their circle's radius^2 / (2 R)."""
     shell = sp.Shell(*cube(0.2))
