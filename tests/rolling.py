@@ -10,14 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin import (
-    Adaptive,
-    BristleFriction,
-    ImpactLaw,
-    Scene,
-    Simulation,
-    Sphere,
-)
+from sphshell_pin import Adaptive, BristleFriction, ImpactLaw, Scene, Simulation, Sphere
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of

@@ -5,17 +5,15 @@ import os
 import re
 import subprocess
 import sys
-from functools import partial
 from html.parser import HTMLParser
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
+from tests.programs import serving
 
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
@@ -125,14 +123,9 @@ def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
 
 
 @pytest.fixture
-def address(built, monkeypatch):
-    site, _ = built
-    monkeypatch.setattr(SimpleHTTPRequestHandler, "log_message", lambda *_: None)
-    handler = partial(SimpleHTTPRequestHandler, directory=str(site))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
+def address(built):
+    with serving(built[0]) as port:
+        yield f"http://127.0.0.1:{port}"
 
 
 @pytest.mark.browser
