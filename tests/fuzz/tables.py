@@ -26,6 +26,7 @@ from tests.scenario.files import DROP, write
 from tests.texts import text_of
 
 PRESS = text_of("scenarios/press.toml")
+SCENARIOS = DROP.encode(), PRESS.encode()
 
 BOX = text_of("scenarios/box.off")
 
@@ -77,9 +78,8 @@ def npz_corpus() -> tuple[bytes, ...]:
     with tempfile.TemporaryDirectory() as home:
         result, _ = simulate(build(write(Path(home)), {"run.record_dt": "5e-3"}))
         log, shapes = result.contacts, {"q": result.v.shape, "v": result.v.shape}
-        shapes |= {
-            name: getattr(log, name).shape for name in ("force_world", "normal_force", "depth")
-        }
+        for name in ("force_world", "normal_force", "depth"):
+            shapes[name] = getattr(log, name).shape
         rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
         by = Sensitivities(("v0.0", "v0.1"), **rows)
         result = replace(result, sensitivities=by)
@@ -167,10 +167,6 @@ _RESHAPED: tuple[Callable[[Any], Any], ...] = (
     *(np.asfortranarray, lambda a: a[0], np.flip),
 )
 _KINDS = ("f4", "f2", "i1", "u8", "i8", "?", "c16", "U8", "S8", "O", "M8[s]", ">f8")
-
-
-def toml_corpus() -> tuple[bytes, ...]:
-    return DROP.encode(), PRESS.encode()
 
 
 def damaged_toml(rng: random.Random, data: bytes) -> bytes:

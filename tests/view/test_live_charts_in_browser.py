@@ -27,17 +27,10 @@ def tab(browser, tmp_path):
 
 
 def test_quantities_and_their_curves_can_be_chosen(tab):
-    offered = tab.page.locator("#quantity option").all_inner_texts()
-    assert offered == [
-        "Force [N]",
-        "Depth [mm]",
-        "Joint position [deg]",
-        "Joint velocity [deg/s]",
-        "Controller torque [N m]",
-        "Sensor wrist [N]",
-        "Sensor wrist [N m]",
-        "Energy residual [J]",
-    ]
+    offered = ["Force [N]", "Depth [mm]", "Joint position [deg]", "Joint velocity [deg/s]"]
+    offered += ["Controller torque [N m]", "Sensor wrist [N]", "Sensor wrist [N m]"]
+    offered += ["Energy residual [J]"]
+    assert tab.page.locator("#quantity option").all_inner_texts() == offered
     assert tab.page.evaluate("chart.run.keys") == ["normal", "friction"]
     tab.page.evaluate("document.getElementById('step-size').value = '0.1'")
     tab.click("#step")
