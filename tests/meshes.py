@@ -63,8 +63,7 @@ def delaunay_plate(elements: int, seed: int = 0, size: float = 1.0) -> Mesh:
 
     rng = np.random.default_rng(seed)
     square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    inner = rng.uniform(-0.5, 0.5, (max(0, elements // 2 - 1), 2))
-    plane = np.concatenate([square, inner])
+    plane = np.concatenate([square, rng.uniform(-0.5, 0.5, (max(0, elements // 2 - 1), 2))])
     vertices = np.concatenate([plane, np.zeros((len(plane), 1))], axis=1) * size
     return vertices, Delaunay(plane).simplices.astype(np.int32)
 
@@ -104,8 +103,7 @@ def revolved(profile: ArrayLike, columns: int | NDArray[np.float64]) -> Mesh:
 
 def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
     """Strip of long thin triangles (length 1, width 1/aspect) folded at random small angles."""
-    rng = np.random.default_rng(seed)
-    angle = np.cumsum(rng.uniform(-0.3, 0.3, count + 1))
+    angle = np.cumsum(np.random.default_rng(seed).uniform(-0.3, 0.3, count + 1))
     step = np.stack([np.zeros(count + 1), np.cos(angle), np.sin(angle)], axis=1) / aspect
     rail = np.cumsum(step, axis=0)
     left = rail - np.array([0.5, 0.0, 0.0])
@@ -113,14 +111,12 @@ def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
     vertices = np.empty((2 * (count + 1), 3))
     vertices[0::2], vertices[1::2] = left, right
     pair = np.array([[0, 1, 3], [0, 3, 2]], dtype=np.int32)
-    triangles = pair + 2 * np.arange(count, dtype=np.int32)[:, None, None]
-    return vertices, triangles.reshape(-1, 3)
+    return vertices, (pair + 2 * np.arange(count, dtype=np.int32)[:, None, None]).reshape(-1, 3)
 
 
 def fan(blades: int = 5, seed: int = 0) -> Mesh:
     """Non-manifold book: `blades` pairs of triangles that share the edge x in [-0.5, 0.5]."""
-    rng = np.random.default_rng(seed)
-    angles = np.sort(rng.uniform(0, 2 * np.pi, blades))
+    angles = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, blades))
     vertices = [np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])]
     triangles = []
     for angle in angles:

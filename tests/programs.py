@@ -47,8 +47,7 @@ class Silent(SimpleHTTPRequestHandler):
 @contextmanager
 def serving(folder: Path) -> Iterator[int]:
     """Serve the files of a folder, at the port that is yielded."""
-    handler = partial(Silent, directory=str(folder))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Silent, directory=str(folder))) as server:
         Thread(target=server.serve_forever, daemon=True).start()
         yield server.server_port
         server.shutdown()

@@ -128,8 +128,7 @@ class Case:
         known = max(1e-13, error * float(getattr(self.integrator, "rtol", 0.0)))
         resolved = [known * max(float(np.abs(one).max(initial=0.0)), 1e-3) for one in sizes]
         # A touch within a step of fixed length leaves kinks, one a step.
-        fixed = hasattr(self.integrator, "dt")
-        shares = (1e-5, 1e-4, 1e-6) if fixed else (1e-3, 1e-2, 1e-4, 1e-5)
+        shares = (1e-5, 1e-4, 1e-6) if hasattr(self.integrator, "dt") else (1e-3, 1e-2, 1e-4, 1e-5)
         for k, column in enumerate(columns):
             alike = [j for j, kind in enumerate(kinds) if kind == kinds[k]]
             scale, ahead = self.scale(column, depth)

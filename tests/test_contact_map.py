@@ -21,10 +21,8 @@ def grid(cells=4):
 
 def on(shell, rows, pairs=("tip",), t=(0.0, 1.0, 3.0, 4.0)):
     """Result and scene of a ball with these contacts on `shell`."""
-    model = stand_ins.ball_model()
-    made = (stand_ins.contact_pair(model, "ball", 0.05, shell, name=name) for name in pairs)
-    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (len(t), 1))
-    return stand_ins.a_result(t, q, rows, pairs), stand_ins.a_scene(model, *made)
+    q = np.tile(stand_ins.ball_configuration(), (len(t), 1))
+    return stand_ins.a_result(t, q, rows, pairs), stand_ins.ball_scene(shell, names=pairs)
 
 
 def painted(axis):
@@ -79,11 +77,9 @@ def test_a_solid_held_from_both_sides_has_two_pictures():
     right = {"row": 1, "element": 1, "point_world": [0.5, 0, 0], "normal_world": [1.0, 0, 0]}
     rows = [left, {**right, "pair": 1, "normal_force": 3.0}]
     figure = plot_contact_map(*on(box, rows, ("thumb", "index")))
-    titles = [axis.get_title() for axis in figure.axes]
-    assert titles[:2] == ["box", "box, the other side"]
+    assert [axis.get_title() for axis in figure.axes][:2] == ["box", "box, the other side"]
     for axis, own in zip(figure.axes[:2], ("index", "thumb"), strict=True):
-        names = {text.get_text().strip() for text in axis.texts}
-        assert names & {"index", "thumb"} == {own}
+        assert {text.get_text().strip() for text in axis.texts} & {"index", "thumb"} == {own}
 
 
 def test_a_fine_mesh_is_colored_as_wide_as_a_line(monkeypatch):

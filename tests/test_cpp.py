@@ -118,8 +118,7 @@ def test_the_example_comes_to_the_numbers_of_python(built):
     contacts = scene.contacts(q, v)
     np.testing.assert_allclose(printed, q, rtol=1e-10)
     np.testing.assert_allclose([force, depth], [*contacts.normal_force, *contacts.depth], rtol=1e-8)
-    usage = call(built / "cpp-finger" / "finger_on_wall", fails=True)
-    assert "usage: finger_on_wall URDF" in usage
+    assert "usage: finger_on_wall URDF" in call(built / "cpp-finger" / "finger_on_wall", fails=True)
 
 
 @pytest.mark.parametrize("name", ["laws", "surfaces", "scenes", "page"])
@@ -159,8 +158,7 @@ def test_contacts_are_those_of_python_to_the_bit(built):
 def test_a_loop_of_its_own_moves_a_compiled_robot_as_pinocchio_does(built, monkeypatch, tmp_path):
     monkeypatch.setenv(cache.CACHE, str(tmp_path / "cache"))
     panda = example_robot_data.load("panda")
-    path = compile_robot(panda.model)
-    printed = call(built / "cpp-tests" / "press", panda.urdf, path, 10, 40)
+    printed = call(built / "cpp-tests" / "press", panda.urdf, compile_robot(panda.model), 10, 40)
     found = re.search(r"touching 1, apart (\S+)", printed)
     assert found, printed
     assert float(found[1]) < 1e-13

@@ -51,8 +51,7 @@ def test_every_extra_is_in_the_table_and_in_all():
     table = re.findall(r"^\| `(\w+)` \|", INSTALL, re.MULTILINE)
     assert set(EXTRAS) <= set(table), "the table of extras in docs/install.md lacks some"
     (everything,) = EXTRAS["all"]
-    inside = set(everything.partition("[")[2].rstrip("]").split(","))
-    assert inside == set(EXTRAS) - {"all"}
+    assert set(everything.partition("[")[2].rstrip("]").split(",")) == set(EXTRAS) - {"all"}
 
 
 def test_an_extra_that_an_error_names_exists():
@@ -92,8 +91,7 @@ def test_the_policy_of_the_wheels_is_that_of_pinocchios():
     for name in ("pin", "coal"):
         wheel = importlib.metadata.distribution(name).read_text("WHEEL")
         policies |= set(re.findall(r"^Tag: .*-(manylinux_\d+_\d+)_\w+$", wheel, re.MULTILINE))
-    images = {WHEELS["linux"][f"manylinux-{one}-image"] for one in ("x86_64", "aarch64")}
-    assert policies == images
+    assert policies == {WHEELS["linux"][f"manylinux-{one}-image"] for one in ("x86_64", "aarch64")}
     assert "--plat $AUDITWHEEL_PLAT --only-plat" in WHEELS["linux"]["repair-wheel-command"]
 
 

@@ -35,8 +35,7 @@ def trip(request: pytest.FixtureRequest) -> Trip:
 
 def touching(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Any, Any, Any]:
     """Let the ball's center touch a plane 20 mm below the shell's vertices."""
-    depth = 0.03 - pose_i.translation[2]
-    return [pose_i.translation - [0, 0, 0.05]], [[0, 0, 1.0]], [depth]
+    return [pose_i.translation - [0, 0, 0.05]], [[0, 0, 1.0]], [(0.03 - pose_i.translation[2])]
 
 
 def bumpy_scene() -> sp.Scene:

@@ -80,7 +80,7 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
         for k, name in enumerate(names)
     ]
     rows = [{"row": k, "pair": k, "point_world": [0.01 * k, 0.05 * k, 0]} for k in range(6)]
-    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (6, 1))
+    q = np.tile(stand_ins.ball_configuration(), (6, 1))
     result = stand_ins.a_result(np.arange(6), q, rows, names)
     written = " ".join(texts(plot.plot_contact_map(result, stand_ins.a_scene(model, *pairs))))
     assert all(name in written for name in (*names, "plate 0", "plate 1", "plate 2"))
@@ -89,8 +89,7 @@ def test_every_shell_has_its_own_picture_and_every_pair_its_name():
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
     count = MOST_PAIRS + 3
     rows = [{"row": 1, "pair": k, "normal_force": 1.0 + k} for k in range(count)]
-    names = [f"pair {k}" for k in range(count)]
-    result = stand_ins.a_result([0, 1], np.zeros((2, 8)), rows, names)
+    result = stand_ins.a_result([0, 1], np.zeros((2, 8)), rows, [f"pair {k}" for k in range(count)])
     for kind in ("overview", "force"):
         written = " ".join(texts(plot.plot_result(result, kind)))
         assert "pair 0" not in written

@@ -96,8 +96,7 @@ def home(tmp_path_factory) -> Path:
 def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypatch):
     found = Section("x", "é", findings=[Finding("a", "a", 1.0)])
     parts = [Part("x", "é", lambda **_: found, (1.0, 1.0))]
-    small = functools.partial(report.make_report, parts=parts)
-    monkeypatch.setattr(report, "make_report", small)
+    monkeypatch.setattr(report, "make_report", functools.partial(report.make_report, parts=parts))
 
     def ended_by_ctrl_c(url: str) -> None:
         echo(url)
@@ -123,7 +122,6 @@ def test_these_are_all_commands():
 def test_on_a_pipe_lines_say_that_work_goes_on(capsys):
     with progress_bar("searching", line_every=0.01, total=None):
         time.sleep(0.2)
-    said = capsys.readouterr().err.splitlines()
-    assert said[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
+    assert capsys.readouterr().err.splitlines()[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
     time.sleep(0.05)
     assert not capsys.readouterr().err.splitlines()[1:]  # one may be on its way

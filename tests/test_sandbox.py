@@ -117,7 +117,6 @@ def test_the_numbers_of_system_calls_are_those_of_the_kernel(header, column, nam
         pytest.skip("the kernel's headers are not there")
     pairs = re.findall(r"#define __NR_?(\w+)\s+(\d+)\s", file.read_text())
     known = {name.removeprefix("_"): number for name, number in pairs}
-    words = sandbox._CALLS.split()
-    for name, *numbers in zip(*[iter(words)] * 3, strict=True):
+    for name, *numbers in zip(*[iter(sandbox._CALLS.split())] * 3, strict=True):
         theirs = known.get(name, known.get(f"3264_{name}", known.get(names.get(name, ""), "-")))
         assert numbers[column] == theirs, name

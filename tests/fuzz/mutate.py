@@ -190,8 +190,7 @@ def _places(tree: Any) -> Any:
     waiting = [tree]
     while waiting:
         node = waiting.pop()
-        items = node.items() if isinstance(node, dict) else enumerate(node)
-        for key, value in list(items):
+        for key, value in list(node.items() if isinstance(node, dict) else enumerate(node)):
             yield node, key
             if isinstance(value, dict | list):
                 waiting.append(value)

@@ -81,8 +81,7 @@ def npz_corpus() -> tuple[bytes, ...]:
         for name in ("force_world", "normal_force", "depth"):
             shapes[name] = getattr(log, name).shape
         rows = {name: np.ones((*shape, 2)) for name, shape in shapes.items()}
-        by = Sensitivities(("v0.0", "v0.1"), **rows)
-        result = replace(result, sensitivities=by)
+        result = replace(result, sensitivities=Sensitivities(("v0.0", "v0.1"), **rows))
         return (reproducible(result.save(Path(home, "run.npz"))),)
 
 

@@ -38,8 +38,7 @@ def test_quantities_and_their_curves_can_be_chosen(tab):
     # Chosen after the step: what was recorded is shown all the same.
     tab.page.select_option("#quantity", "Joint position [deg]")
     tab.wait("chart.curves.every((one) => chart.run.keys.includes(one.key))")
-    joints = ["q.knuckle", "q.middle_joint", "q.distal_joint"]
-    assert tab.page.evaluate("chart.run.keys") == joints
+    assert tab.page.evaluate("chart.run.keys") == ["q.knuckle", "q.middle_joint", "q.distal_joint"]
     t, angle = tab.page.evaluate("chart.run.rows[0].slice(0, 2)")
     assert t < 0.02
     assert angle == pytest.approx(np.rad2deg(0.3), abs=1.0)

@@ -73,8 +73,7 @@ def test_a_link_is_dragged_with_the_mouse_and_comes_back(arm):
     eye = take_hold(live, tab)
     tab.wait("state.drag && state.drag.newtons > 1")
     wait_until_still(live, tab)
-    moved = point_of(live) - before
-    assert moved @ right > 0.01
+    assert (point_of(live) - before) @ right > 0.01
     assert live.player.drag.force_world @ right > 0.0
     assert tab.state("drag.body") == "lower"
     # It is the force at rest: the label and the state are of the same instant or the next one.

@@ -42,8 +42,7 @@ def test_the_page_is_told_what_can_be_taken_hold_of(arm):
     assert set(offered["drag"]["nodes"].values()) == {"upper", "lower"}
     assert offered["drag"]["stiffness"] > 0.0
     limits = {"low": -2.0, "high": 1.5, "limited": True}
-    elbow = {"joint": "elbow", "rotates": True, "value": 0.5} | limits
-    assert offered["targets"][1] == elbow
+    assert offered["targets"][1] == ({"joint": "elbow", "rotates": True, "value": 0.5} | limits)
 
 
 def test_a_drag_pulls_the_point_of_the_node_that_was_hit(arm):
@@ -96,8 +95,7 @@ def test_the_last_browser_drags_and_only_it_releases(arm):
 
 def test_while_it_drags_no_button_pushes(ball):
     say(ball, "hold", OTHER_TAB, body="ball", direction=[1.0, 0.0, 0.0], newtons=1.0)
-    node = "/meshcat/spheres/0_ball-plate"
-    drag(ball, [0.0, 0.0, 0.1], node=node, point=[0.0, 0.0, 0.0])
+    drag(ball, [0.0, 0.0, 0.1], node="/meshcat/spheres/0_ball-plate", point=[0.0, 0.0, 0.0])
     frames(ball, 10)
     assert ball.player.drag is not None
     say(ball, "release")
