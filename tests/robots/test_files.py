@@ -79,8 +79,7 @@ def test_a_mesh_that_is_missing_warns_once_and_goes_on(tmp_path):
     """Motion needs none, nor one that is broken."""
     file = arm(tmp_path, visual=URI)
     part = urdf.shape("visual", urdf.mesh(URI))
-    more = part + part.replace("cube", "ball") + part
-    file.write_text(file.read_text().replace(part, more))
+    file.write_text(file.read_text().replace(part, part + part.replace("cube", "ball") + part))
     with pytest.warns(RobotWarning, match=r"cube\.stl, .*ball\.stl; searched in") as caught:
         assert robots.load_file(file).visual_model.ngeoms == 0
     assert len(caught) == 1
@@ -263,7 +262,6 @@ def test_wrong_mimic_joints_are_named(tmp_path, mimic, words):
 def test_a_floating_joint_of_a_urdf_is_fixed_where_the_base_is_to_be(tmp_path):
     file = arm(tmp_path)
     free = '<joint name="f" type="floating"><parent link="world"/><child link="a"/></joint>'
-    more = f'<link name="world"/>{free}</robot>'
-    file.write_text(file.read_text().replace("</robot>", more))
+    file.write_text(file.read_text().replace("</robot>", f'<link name="world"/>{free}</robot>'))
     assert robots.load_file(file).model.nv == 7
     assert robots.load_file(file, free_flyer=False).model.nv == 1

@@ -209,5 +209,4 @@ def test_a_mass_that_only_keeps_a_place_is_none(tmp_path: Path) -> None:
     file = pair(tmp_path, *own, first=(urdf.inertial(100),))
     robot = robots.load_file(file)
     assert lacks_masses(robot.model, robot.description, floating=False)
-    model = robots.load_file(file, density=1000.0).model
-    assert model.inertias[1].mass == pytest.approx(1.0)
+    assert robots.load_file(file, density=1000.0).model.inertias[1].mass == pytest.approx(1.0)

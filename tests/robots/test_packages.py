@@ -52,8 +52,7 @@ def test_a_relative_package_folder_is_that_of_the_working_folder_then(tmp_path, 
 
 
 def test_the_search_ends_at_the_workspace(tmp_path: Path) -> None:
-    file = workspace(tmp_path / "one", "../other/arm_resources")
-    folders = Folders.of(file)
+    folders = Folders.of(workspace(tmp_path / "one", "../other/arm_resources"))
     assert folders.package("arm_resources") is None
     assert str(tmp_path / "one" / "src") in folders.searched()
 
@@ -163,8 +162,7 @@ def test_an_argument_that_names_a_file_takes_one_that_is_there(tmp_path: Path) -
         (tmp_path / "models" / name).mkdir(parents=True)
         urdf.xacro(tmp_path / "models" / name / f"{name}_arm.xacro", f'<link name="{name}"/>')
     include = '<xacro:include filename="models/$(arg kind)/$(arg kind)_arm.xacro"/>'
-    head = '<xacro:arg name="kind" default="none"/>'
-    file = urdf.xacro(tmp_path / "arm.xacro", head, include)
+    file = urdf.xacro(tmp_path / "arm.xacro", '<xacro:arg name="kind" default="none"/>', include)
     with pytest.warns(RobotWarning, match=r"kind=big: or give others; kind may be big, small$"):
         assert robots.load_file(file).model.existFrame("big")
     assert robots.load_file(file, xacro_args={"kind": "small"}).model.existFrame("small")

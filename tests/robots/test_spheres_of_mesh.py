@@ -56,15 +56,12 @@ def test_no_sphere_reaches_beyond_the_mesh(found) -> None:  # type: ignore[no-un
 def test_the_distances_are_those_of_other_places(found) -> None:  # type: ignore[no-untyped-def]
     found, centers, radii, mesh = found
     places, _ = trimesh.sample.sample_surface(mesh, 5000, seed=7)
-    heights = np.linalg.norm(places[:, None] - centers, axis=2) - radii
-    largest = heights.min(axis=1).max()
+    largest = (np.linalg.norm(places[:, None] - centers, axis=2) - radii).min(axis=1).max()
     assert 0.7 * found.mesh_to_spheres < largest < found.mesh_to_spheres * 1.05
-    rng = np.random.default_rng(3)
-    unit = rng.normal(size=(500, 3))
+    unit = np.random.default_rng(3).normal(size=(500, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     around = (centers[:, None] + radii[:, None, None] * unit).reshape(-1, 3)
-    inside_another = np.linalg.norm(around[:, None] - centers, axis=2) < radii - 1e-9
-    free = around[~inside_another.any(axis=1)]
+    free = around[~(np.linalg.norm(around[:, None] - centers, axis=2) < radii - 1e-9).any(axis=1)]
     _, distance, _ = trimesh.proximity.closest_point_naive(mesh, free)
     assert 0.7 * found.spheres_to_mesh < distance.max() < found.spheres_to_mesh * 1.1
 

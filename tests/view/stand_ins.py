@@ -33,7 +33,7 @@ def ball_model():
     return model
 
 
-def ball_configuration(position, angle=0.0):
+def ball_configuration(position=(0.0, 0.0, 0.0), angle=0.0):
     """Configuration (8,) of `ball_model`: ball at `position` (3,), table turned by `angle`."""
     return np.concatenate((position, [0.0, 0.0, 0.0, 1.0], [angle]))
 
@@ -64,10 +64,15 @@ def a_scene(model, *pairs):
     return SimpleNamespace(model=model, pairs=pairs)
 
 
+def ball_scene(shell=None, *more, names=("tip",)):
+    """The ball of `ball_model` and a shell, a plate by default, in as many pairs as names."""
+    model, shell = ball_model(), shell or plate()
+    pairs = (contact_pair(model, "ball", 0.05, shell, *more, name=name) for name in names)
+    return a_scene(model, *pairs)
+
+
 def ball_on_plate(frames=61, dt=0.05):
     """A ball that comes down on a plate, slides over it and leaves; scene and result."""
-    model = ball_model()
-    scene = a_scene(model, contact_pair(model, "ball", 0.05, plate(), name="ball"))
     t = dt * np.arange(frames)
     configurations, rows = [], []
     for row, share in enumerate(np.linspace(0.0, 1.0, frames)):
@@ -76,4 +81,4 @@ def ball_on_plate(frames=61, dt=0.05):
         if 0.25 <= share <= 0.75:
             force = {"normal_force": 5.0 + np.sin(20.0 * share), "point_world": [x, 0.1, 0.0]}
             rows.append({"row": row, "t": t[row], "friction_force_world": [-1.5, 0, 0], **force})
-    return scene, a_result(t, configurations, rows, ("ball",))
+    return ball_scene(names=["ball"]), a_result(t, configurations, rows, ("ball",))

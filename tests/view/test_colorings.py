@@ -52,8 +52,7 @@ def test_each_kind_has_its_color(method):
 
 
 def test_a_recording_states_the_kinds():
-    shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3))
-    scene = scene_of(shell)
+    scene = scene_of(sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3)))
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run([0.0, 0.0, 0.3], duration=0.01)
     for color in ("surface", "faces"):
         page = render_recording(result, scene, color=color)

@@ -49,15 +49,13 @@ def test_a_picture_has_its_time_and_size(rendered, tmp_path):
     red = [np.sum(one[..., 0] > one[..., 1:].max(axis=2) + 100) for one in (start, touching)]
     assert (red[0] > 0, red[1] > 10) == (False, True)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["new", "touching.png"]
-    dark = pixels(rendered("dark.png", dark=True, chart=False))
-    assert dark.mean() < 110 < touching.mean()
+    assert pixels(rendered("dark.png", dark=True, chart=False)).mean() < 110 < touching.mean()
 
 
 @pytest.mark.browser
 def test_a_film_shows_the_pictures_in_their_order(rendered):
     ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    file = rendered("run.mp4", fps=2, span=(0.5, 2.5), chart=False)
-    frames = ffmpeg.read_frames(str(file))
+    frames = ffmpeg.read_frames(str(rendered("run.mp4", fps=2, span=(0.5, 2.5), chart=False)))
     about = next(frames)
     assert (about["size"], about["fps"]) == (SIZE, 2)
     assert about["pix_fmt"].startswith("yuv420p")

@@ -68,8 +68,7 @@ def test_only_the_curves_that_are_asked_for_are_computed():
     def read(key):
         return lambda block: computed.append(key) or block[:, 0]
 
-    series = [Series(k, "Position", k, "deg", "q", read(k)) for k in "abc"]
-    charts = charts_of(series=series)
+    charts = charts_of(series=[Series(k, "Position", k, "deg", "q", read(k)) for k in "abc"])
     rows = rows_of([0.0, 0.01, 0.02], [1, 2, 3], q=[[4], [5], [6]])
     assert charts.add(rows, 0.01) == [[0.0], [0.01]]
     assert computed == []

@@ -16,7 +16,7 @@ from sphshell_pin.view.live.window import LiveWindow
 from tests.scenario.files import DROP, write
 from tests.view.drawn import attribute
 from tests.view.live_player import ArmPlayer, BallPlayer
-from tests.view.stand_ins import a_scene, ball_configuration, ball_model, contact_pair, plate
+from tests.view.stand_ins import ball_configuration, ball_scene
 from tests.view.test_camera import in_picture
 from tests.view.test_live_window import Browser
 
@@ -56,9 +56,7 @@ class Turning(BallPlayer):
     """A ball that stands still on a table, which turns below it."""
 
     def _make_scene(self):
-        self.model = ball_model()
-        pair = contact_pair(self.model, "ball", 0.05, plate(), "table")
-        self.scene = a_scene(self.model, pair)
+        self.scene = ball_scene(None, "table")
 
     def reset(self):
         super().reset()
@@ -148,8 +146,7 @@ def test_the_curved_surface_of_contact_can_be_compared_with_the_flat_one(tmp_pat
 
 @pytest.mark.parametrize("seed", range(20))
 def test_what_is_moved_down_below_the_figures_stays_in_the_picture(seed):
-    random = np.random.default_rng(seed)
-    around = random.uniform(-1, 1, (300, 3))
+    around = np.random.default_rng(seed).uniform(-1, 1, (300, 3))
     view = View.of(np.zeros((1, 3)), around, np.zeros(3), 0.05, reach=100.0)
     before, after = (in_picture(one, around) for one in (view, lowered(view)))
     assert np.abs(after).max() < 1.0

@@ -190,14 +190,12 @@ def test_facets_without_normals_are_lit(kind):
 
 
 def test_files_with_normals_and_what_is_none_stay_as_they_are():
-    corners = np.random.default_rng(3).normal(size=(4, 3, 3))
-    lit = stl_of(np.full((4, 3), 0.6), corners)[0]
+    lit = stl_of(np.full((4, 3), 0.6), np.random.default_rng(3).normal(size=(4, 3, 3)))[0]
     for data in (lit, b"", b"solid a\nfacet normal 1\nendfacet"):
         assert lit_facets(data) is data
     # A facet without an area has no normal.
     flat = stl_of(np.zeros((1, 3)), np.zeros((1, 3, 3)))[0]
-    made = np.frombuffer(lit_facets(flat), STL_RECORD, -1, STL_HEADER)
-    assert np.isfinite(made["normal"]).all()
+    assert np.isfinite(np.frombuffer(lit_facets(flat), STL_RECORD, -1, STL_HEADER)["normal"]).all()
 
 
 def test_a_robot_s_mesh_is_sent_with_normals(tmp_path):

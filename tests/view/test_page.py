@@ -15,8 +15,7 @@ from tests.view.test_meshes import ball, stl
 
 def unpacked(page):
     """The commands of a page, as the browser reads them."""
-    scene = re.search(r'id="scene">([^<]*)<', page).group(1)
-    data = gzip.decompress(base64.b64decode(scene))
+    data = gzip.decompress(base64.b64decode(re.search(r'id="scene">([^<]*)<', page).group(1)))
     commands, at = [], 0
     while at < len(data):
         (length,) = struct.unpack_from("<I", data, at)
@@ -67,8 +66,7 @@ def test_quaternions_take_the_short_way():
 
 
 def test_what_stands_still_costs_no_track_and_a_pause_no_keys():
-    still = [pose(np.eye(3), np.ones(3))] * 50
-    assert filmed(still, np.arange(50))[0] == {}
+    assert filmed([pose(np.eye(3), np.ones(3))] * 50, np.arange(50))[0] == {}
     moved = [pose(np.eye(3), np.array([float(k >= 20), 0, 0])) for k in range(50)]
     tracks = filmed(moved, np.arange(50))[0]
     assert list(tracks) == [".position"]

@@ -44,8 +44,7 @@ def test_a_patch_is_where_the_contact_is(pool):
 
 
 def test_colors_follow_the_pressure(pool):
-    patches = some_patches((1e-3, 1e-3, 1e5), (1e-3, 1e-3, 9e6))
-    poses = pool([{}, {}], patches, PatchScale(4e6))
+    poses = pool([{}, {}], some_patches((1e-3, 1e-3, 1e5), (1e-3, 1e-3, 9e6)), PatchScale(4e6))
     assert set(poses) == {(0, 0), (1, LEVELS - 1)}
 
 

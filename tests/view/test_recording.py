@@ -74,10 +74,9 @@ def test_a_run_that_diverged_is_shown_up_to_its_end(tmp_path):
 
 
 def test_a_run_without_contact_says_so(tmp_path):
-    model = stand_ins.ball_model()
-    scene = stand_ins.a_scene(model, stand_ins.contact_pair(model, "ball", 0.05, stand_ins.plate()))
     q = [stand_ins.ball_configuration([0, 0, height]) for height in (1.0, 0.9, 0.8)]
-    path = write_recording(tmp_path / "run.html", stand_ins.a_result([0, 0.1, 0.2], q), scene)
+    run = stand_ins.a_result([0, 0.1, 0.2], q), stand_ins.ball_scene()
+    path = write_recording(tmp_path / "run.html", *run)
     assert "no contact in this run" in path.read_text()
 
 
