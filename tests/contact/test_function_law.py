@@ -13,7 +13,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin import errors
-from sphshell_pin.scenario import build
+from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.testing import assert_derivatives
 from tests import models
@@ -313,18 +313,18 @@ def test_a_scenario_names_functions_which_looking_does_not_execute(tmp_path) -> 
     text = DROP.replace(LAW_LINE, f"{LAW}\n{FRICTION}")
     path = write(tmp_path, text)
     with pytest.warns(errors.SlowLawWarning):
-        built = build(path)
+        built = build(path, {"run.duration": "0.01"})
     (pair,) = built.scene.pairs
     assert isinstance(pair.law, sp.FunctionLaw)
     assert isinstance(pair.friction, sp.FunctionFriction)
     assert (pair.law.parameters, pair.friction.parameters) == (NUMBERS, SLIP)
-    result = built.simulation.run(built.q0, built.v0, 0.01)
+    run_built(built, tmp_path / "out", recording=False, figures=False)
     starts, speeds = [built.q0] * 2, [[0.1, 0.0, -0.2, 0.0, 0.0, 0.0]] * 2
     mu = {"ball-plate.friction.mu": [0.1, 0.5]}
     runs = built.simulation.rollout(starts, speeds, 0.02, vary=mu)
     assert runs[0].v[-1][0] > runs[1].v[-1][0]
     (tmp_path / "ran").unlink()
-    replay = Replay(result, path)
+    replay = Replay(tmp_path / "out" / "run.npz")
     assert not (tmp_path / "ran").exists()
     with pytest.raises(errors.SphshellError, match=r"law\.function: 'own.py:force' was not loaded"):
         replay.scene.pairs[0].law.normal_force(1e-3)

@@ -14,15 +14,12 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.study import robot_check
 from sphshell_pin.study.robot_check import QUICK, RobotReport, Sizes, check_robot, contact_scene
 from sphshell_pin.study.robot_check.checks import CHECKS
-from sphshell_pin.study.robot_check.models import load_subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
-from sphshell_pin.study.robot_check.probe_spheres import find_sphere
 from sphshell_pin.study.robot_check.report import FAILED, NOT_CHECKED, PASS, as_json, remarks
 from sphshell_pin.testing.finding import Finding
 from tests import urdf
 from tests.command import call, refused
 from tests.studies import mostly_studies
-from tests.texts import text_of
 
 ROOT = Path(__file__).parents[2]
 TINY = Sizes(1, 1, 4)
@@ -213,26 +210,6 @@ REPORTS = [
     RobotReport("absent", reason="it is not there"),
     RobotReport("fine", "tip", 0.01, 3, 3, SMALL, ("odd",)),
 ]
-
-
-URDF_MASS = """<inertial><mass value="1"/><origin xyz="0 0 0.2"/>
-    <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>"""
-
-
-MJCF_MASS = '<inertial pos="0 0 0.2" mass="1" diaginertia="1 1 1"/>'
-
-
-@pytest.mark.parametrize(("name", "mass"), [("meshed.urdf", URDF_MASS), ("meshed.xml", MJCF_MASS)])
-def test_a_sphere_inside_the_last_mesh_is_used(name: str, mass: str, tmp_path: Path) -> None:
-    file = tmp_path / name
-    file.write_text(text_of(f"robots/{name}").replace("<!-- MASS -->", mass))
-    report = check_robot(file, sizes=TINY)
-    assert report.verdict == PASS, report
-    assert any("the outermost of 8 inside the collision mesh of 'rod'" in n for n in report.notes)
-    subject = load_subject(file)
-    tip, _ = find_sphere(subject, subject.robot.model, np.random.default_rng(0), None, None)
-    assert 0.3 < tip.offset[2] < 0.4  # near the rod's end at 0.4 m
-    assert 0.01 < tip.radius <= 0.025
 
 
 def test_the_figures_as_json() -> None:
