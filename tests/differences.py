@@ -78,11 +78,9 @@ def moves(scene: sp.Scene, q: Array, v: Array, tau: Array | None = None) -> dict
             f"v.{k}": Move(lambda x, e=e: (scene, q, v + x * e, tau), fast),
             f"tau.{k}": Move(lambda x, e=e: (scene, q, v, tau + x * e), 1e3),
         }
-    for column in (one for name in names_of(scene) for one in columns_of(name)):
-        found[column] = Move(
-            lambda x, column=column: (changed(scene, column, x), q, v, tau),
-            *scale_of(scene, column, depth),
-        )
+    for one in (one for name in names_of(scene) for one in columns_of(name)):
+        scale = scale_of(scene, one, depth)
+        found[one] = Move(lambda x, one=one: (changed(scene, one, x), q, v, tau), *scale)
     return found
 
 

@@ -24,9 +24,8 @@ def _split(cells: NDArray[np.int64], other_diagonal: NDArray[np.bool_]) -> NDArr
 
 def grid_plate(rows: int = 1, columns: int = 1, size: float = 1.0, quads: bool = False) -> Mesh:
     """Plate z = 0 over [-size/2, size/2]^2, normals +z; x runs with the rows."""
-    x, y = np.meshgrid(
-        np.linspace(-0.5, 0.5, rows + 1), np.linspace(-0.5, 0.5, columns + 1), indexing="ij"
-    )
+    sides = (np.linspace(-0.5, 0.5, count + 1) for count in (rows, columns))
+    x, y = np.meshgrid(*sides, indexing="ij")
     vertices = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1) * size
     cells = _cells(rows, columns)
     if quads:
@@ -48,10 +47,8 @@ def random_plate(elements, seed=0, size=1.0, jitter=0.45, slivers=True):
             row[rng.permutation(np.arange(1, n - 1, 2))[: max(1, n // 10)]] = 1e-3
     x, y = (np.concatenate([[0.0], np.cumsum(w)]) / w.sum() - 0.5 for w in widths)
     # A vertex moves less than a quarter of the smaller cell beside it: no diagonal can fold.
-    reach = [
-        np.concatenate([[0.0], np.minimum(w[1:], w[:-1]), [0.0]]) / w.sum() / 2 * jitter
-        for w in widths
-    ]
+    inner = (np.minimum(w[1:], w[:-1]) / w.sum() / 2 * jitter for w in widths)
+    reach = [np.concatenate([[0.0], one, [0.0]]) for one in inner]
     gx, gy = np.meshgrid(x, y, indexing="ij")
     gx = gx + rng.uniform(-1, 1, gx.shape) * reach[0][:, None]
     gy = gy + rng.uniform(-1, 1, gy.shape) * reach[1][None, :]
@@ -66,20 +63,17 @@ def delaunay_plate(elements: int, seed: int = 0, size: float = 1.0) -> Mesh:
 
     rng = np.random.default_rng(seed)
     square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    inner = rng.uniform(-0.5, 0.5, (max(0, elements // 2 - 1), 2))
-    plane = np.concatenate([square, inner])
+    plane = np.concatenate([square, rng.uniform(-0.5, 0.5, (max(0, elements // 2 - 1), 2))])
     vertices = np.concatenate([plane, np.zeros((len(plane), 1))], axis=1) * size
     return vertices, Delaunay(plane).simplices.astype(np.int32)
 
 
 def cube(size: float = 1.0, quads: bool = False) -> Mesh:
     """Closed cube about the origin, outward winding."""
-    corners = np.array(
-        [[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)], dtype=float
-    )
-    faces = np.array(
-        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    )
+    ends = (-0.5, 0.5)
+    corners = np.array([[x, y, z] for x in ends for y in ends for z in ends])
+    sides = ("0132", "4675", "0451", "2376", "0264", "1573")
+    faces = np.array([[int(corner) for corner in side] for side in sides])
     elements = faces if quads else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
     return corners * size, elements.astype(np.int32)
 
@@ -109,8 +103,7 @@ def revolved(profile: ArrayLike, columns: int | NDArray[np.float64]) -> Mesh:
 
 def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
     """Strip of long thin triangles (length 1, width 1/aspect) folded at random small angles."""
-    rng = np.random.default_rng(seed)
-    angle = np.cumsum(rng.uniform(-0.3, 0.3, count + 1))
+    angle = np.cumsum(np.random.default_rng(seed).uniform(-0.3, 0.3, count + 1))
     step = np.stack([np.zeros(count + 1), np.cos(angle), np.sin(angle)], axis=1) / aspect
     rail = np.cumsum(step, axis=0)
     left = rail - np.array([0.5, 0.0, 0.0])
@@ -118,14 +111,12 @@ def needles(count: int = 24, aspect: float = 1e4, seed: int = 0) -> Mesh:
     vertices = np.empty((2 * (count + 1), 3))
     vertices[0::2], vertices[1::2] = left, right
     pair = np.array([[0, 1, 3], [0, 3, 2]], dtype=np.int32)
-    triangles = pair + 2 * np.arange(count, dtype=np.int32)[:, None, None]
-    return vertices, triangles.reshape(-1, 3)
+    return vertices, (pair + 2 * np.arange(count, dtype=np.int32)[:, None, None]).reshape(-1, 3)
 
 
 def fan(blades: int = 5, seed: int = 0) -> Mesh:
     """Non-manifold book: `blades` pairs of triangles that share the edge x in [-0.5, 0.5]."""
-    rng = np.random.default_rng(seed)
-    angles = np.sort(rng.uniform(0, 2 * np.pi, blades))
+    angles = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, blades))
     vertices = [np.array([-0.5, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])]
     triangles = []
     for angle in angles:
@@ -186,9 +177,7 @@ def crumpled(cells: int = 4, seed: int = 0, height: float = 0.15) -> Mesh:
 
 def random_rotation(seed: int) -> NDArray[np.float64]:
     """Proper rotation matrix, uniform enough for tests."""
-    rng = np.random.default_rng(seed)
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
     q = q * np.sign(np.diag(r))
-    if np.linalg.det(q) < 0:
-        q[:, 0] = -q[:, 0]
+    q[:, 0] *= np.sign(np.linalg.det(q))
     return np.asarray(q)

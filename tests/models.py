@@ -63,12 +63,11 @@ def add_body(
     frame: pin.SE3 | None = None,
 ) -> int:
     """Add a body on `joint` with a frame called `name` on it; return the joint's index."""
-    index = model.addJoint(parent, joint, placement or pin.SE3.Identity(), f"{name}_joint")
-    inertia = inertia or pin.Inertia.FromSphere(1.0, 0.05)
+    here = pin.SE3.Identity()
+    index = model.addJoint(parent, joint, placement or here, f"{name}_joint")
     model.addJointFrame(index)
-    model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
-    placed = frame or pin.SE3.Identity()
-    model.addFrame(pin.Frame(name, index, placed, pin.FrameType.OP_FRAME))
+    model.appendBodyToJoint(index, inertia or pin.Inertia.FromSphere(1.0, 0.05), here)
+    model.addFrame(pin.Frame(name, index, frame or here, pin.FrameType.OP_FRAME))
     return int(index)
 
 
@@ -97,6 +96,11 @@ def block(
     model = ball(gravity, mass, radius, pin.JointModelTranslation())
     model.gravity.linear = gravity * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
     return model
+
+
+def run(scene: Scene, integrator, q, v=None, duration=0.1, **more) -> sp.Result:  # type: ignore[no-untyped-def]
+    """Run a scene from rest, unless a velocity is given."""
+    return sp.Simulation(scene, integrator).run(q, v, duration, **more)
 
 
 def free_q(position: Vector) -> Vector:
@@ -162,11 +166,8 @@ def two_free_state(depth: float = 0.01, radius: float = 0.05) -> tuple[Vector, V
     q = np.concatenate([pin.SE3ToXYZQUAT(pin.SE3(np.eye(3), center)), pin.SE3ToXYZQUAT(table)])
     v_ball = np.array([0.3, -0.2, 0.1, 40.0, -30.0, 50.0])
     v_table = np.array([-0.1, 0.2, 0.1, 3.0, -4.0, 12.0])
-    model = empty()
-    add_body(model, "table", pin.JointModelFreeFlyer())
     # The ball's center rides along with the table, but for a small velocity of its own.
-    along = pin.Motion(v_table)
-    world = table.act(along)
+    world = table.act(pin.Motion(v_table))
     v_ball[:3] += world.linear + np.cross(world.angular, center)
     return q, np.concatenate([v_ball, v_table])
 

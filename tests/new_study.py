@@ -33,24 +33,20 @@ from sphshell_pin.scenario.format.bodies import to_se3
 from sphshell_pin.scenario.format.build import Built
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
+from tests import texts
 
-ROOT = Path(__file__).parents[1]
-DATA = ROOT / "tests" / "data" / "corpus"
-FILES = ROOT / "tests" / "data"
-
+DATA = texts.DATA / "corpus"
 SHIPPED = (
     *("panda", "ur3", "ur5", "ur10", "xarm7", "z1", "kinova", "so100", "so101", "talos_arm"),
     *("finger_edu", "three_link_finger", "allegro_right_hand", "asr_twodof", "ball", "a1", "go2"),
     "solo12",
 )
-ROBOTS: dict[str, tuple[str, dict[str, object]]] = {
-    **{name: (name, {}) for name in SHIPPED},
-    "arm_with_probe": (str(FILES / "robots" / "arm_with_probe.urdf"), {}),
-    "arm_offset": (str(FILES / "robots" / "arm_offset.urdf"), {}),
-    "gantry": (str(FILES / "robots" / "gantry.urdf.xacro"), {}),
-    "hand_xacro": (str(FILES / "xacro" / "hand.urdf.xacro"), {}),
+ROBOTS = {name: name for name in SHIPPED} | {
+    file.partition("/")[2].partition(".")[0]: str(texts.DATA / file)
+    for file in ("robots/arm_with_probe.urdf", "robots/arm_offset.urdf", "robots/gantry.urdf.xacro")
 }
-"""What `new` is asked: the robot, and the options that it cannot do without."""
+ROBOTS["hand_xacro"] = str(texts.DATA / "xacro" / "hand.urdf.xacro")
+"""What `new` is asked."""
 
 PLACES = ("-", "below", "above", "+x", "-x", "+y")
 """Values of --place; "-": none."""
@@ -108,15 +104,14 @@ def read_once(file: Path, folder: Path) -> Path:
 
 def ask(robot: str, part: Path, place: str) -> Case:
     """Ask `new` for one scenario, and run what it writes."""
-    name, options = ROBOTS[robot]
     began = time.perf_counter()
     case = Case(robot, part.stem, place)
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path = Path(folder) / "made.toml"
-        asked = options if place == "-" else {**options, "place": place}
+        asked = {} if place == "-" else {"place": place}
         try:
-            new_scenario(name, part, out=path, **asked)
+            new_scenario(ROBOTS[robot], part, out=path, **asked)
         except SphshellError as error:
             if path.exists():
                 return replace(case, failed=f"refused and written: {error}")
@@ -154,15 +149,12 @@ def failure(built: Built) -> str:
     result, stopped = simulate(built)
     if stopped is not None:
         return str(stopped)
-    for one in judge(built, result):
-        if not one.met:
-            return f"{one.figure} is {one.measured:.4g}, not {one.expected}"
+    missed = [one for one in judge(built, result) if not one.met]
+    if missed:
+        return f"{missed[0].figure} is {missed[0].measured:.4g}, not {missed[0].expected}"
     rows = np.unique(np.linspace(0, len(result.t) - 1, 12).astype(int))
-    for q in result.q[rows]:
-        link = link_inside(built, q)
-        if link:
-            return f"link {link} is in the part"
-    return ""
+    inside = next(filter(None, (link_inside(built, q) for q in result.q[rows])), "")
+    return f"link {inside} is in the part" if inside else ""
 
 
 def link_inside(built: Built, q: np.ndarray) -> str:
@@ -187,14 +179,9 @@ def link_inside(built: Built, q: np.ndarray) -> str:
         corners = np.asarray(one.geometry.vertices()) @ pose.rotation.T + pose.translation
         for center, radius in spheres:
             corners = corners[np.linalg.norm(corners - center, axis=1) > _AT_TIP * radius]
-        if not len(corners):
-            continue
         local = (corners - part.translation) @ part.rotation
-        near = ((local > shell.box[0]) & (local < shell.box[1])).all(axis=1)
-        if (
-            near.any()
-            and (shell.closest_points(local[near], method="facets").distances < -_DEEP).any()
-        ):
+        near = local[((local > shell.box[0]) & (local < shell.box[1])).all(axis=1)]
+        if (shell.closest_points(near, method="facets").distances < -_DEEP).any():
             return str(one.name)
     return ""
 
@@ -218,8 +205,7 @@ def main() -> int:
             for case in pool.map(ask, *zip(*questions, strict=True)):
                 cases.append(case)
                 said = f"refused: {case.refused}" if case.refused else case.failed or case.word
-                where = f"{case.robot}  {case.part}  {case.place}  {case.seconds:.1f} s"
-                print(f"{where}  {said}", flush=True)
+                print(case.robot, case.part, case.place, f"{case.seconds:.1f} s", said, flush=True)
     found = sections(cases)
     print(found[0].text, *(" | ".join(row) for one in found for row in one.table), sep="\n")
     if asked.write:
@@ -238,10 +224,10 @@ def sections(cases: Sequence[Case]) -> list[Measured]:
     floor = sum(abs(case.raised) < 1e-3 for case in arms)
     text = (
         f"{len(cases)} cases: {len(cases) - count['refused']} written, of which {count['fails']} "
-        f"fail; {count['refused']} refused. Of {len(arms)} that press, {count['slides']} slide and "
-        f"in {floor} the part is on the floor. Seconds for an answer: median "
-        f"{np.median(times):.1f}, most {max(times):.1f}."
     )
+    text += f"fail; {count['refused']} refused. Of {len(arms)} that press, {count['slides']} slide "
+    text += f"and in {floor} the part is on the floor. Seconds for an answer: median "
+    text += f"{np.median(times):.1f}, most {max(times):.1f}."
     words: dict[tuple[str, str], Counter[str]] = {}
     for case in cases:
         words.setdefault((case.robot, case.part), Counter())[case.word] += 1
@@ -251,10 +237,8 @@ def sections(cases: Sequence[Case]) -> list[Measured]:
         rows.append([robot, *(", ".join(f"{w} {n}" if n > 1 else w for w, n in f) for f in found)])
     reasons = Counter(reason(case.refused) for case in cases if case.refused)
     counts = [[text, str(count)] for text, count in reasons.most_common()]
-    return [
-        Measured(text=text, table=rows),
-        Measured("New scenarios refused", table=[["because", "cases"], *counts]),
-    ]
+    refused = [["because", "cases"], *counts]
+    return [Measured(text=text, table=rows), Measured("New scenarios refused", table=refused)]
 
 
 def reason(text: str) -> str:

@@ -10,14 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin import (
-    Adaptive,
-    BristleFriction,
-    ImpactLaw,
-    Scene,
-    Simulation,
-    Sphere,
-)
+from sphshell_pin import Adaptive, BristleFriction, ImpactLaw, Scene, Simulation, Sphere
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of
@@ -67,7 +60,7 @@ class Ball:
         return scene
 
 
-def state(center, velocity, spin):
+def state(center, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)):
     """Return q0, v0 of the unturned free ball; all in the world, [m], [m/s], [rad/s]."""
     q0 = np.concatenate([np.asarray(center, dtype=float), [0.0, 0.0, 0.0, 1.0]])
     return q0, np.concatenate([velocity, spin]).astype(float)
@@ -186,8 +179,7 @@ def in_bowl(ball, shell, radius, angle, *, stiffness, friction=None, periods=2):
     expected = swing_period(angle, reach) * math.sqrt(1 + ball.beta(depth))
     bristles = ball.bristle(1.0, stiffness)
     scene = ball.scene(shell, ball.spring(stiffness), bristles if friction is None else friction)
-    duration = (periods + 0.35) * expected
-    result = Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=1e-3)
+    result = Simulation(scene, PRECISE).run(q0, v0, (periods + 0.35) * expected, record_dt=1e-3)
     seen = mean_period(result.t, result.q[:, 0], velocities(result)[:, 0], periods)
     return Swinging(result, seen, expected)
 

@@ -47,11 +47,8 @@ class Case:
     ) -> None:
         self.scene, self.duration, self.integrator = scene, duration, integrator
         self.q0, self.v0 = np.array(q0, dtype=float), np.array(v0, dtype=float)
-        self.options = {
-            "record_dt": duration / 8 if record_dt is None else record_dt,
-            "controller": controller,
-            "control_dt": control_dt,
-        }
+        self.options = {"record_dt": record_dt or duration / 8}
+        self.options |= {"controller": controller, "control_dt": control_dt}
 
     def run(self, scene=None, q0=None, v0=None, names=None):
         asked = {} if names is None else {"sensitivities": names}
@@ -119,12 +116,9 @@ class Case:
             log = run.contacts
             if log.row.tolist() != plain.contacts.row.tolist():
                 return tuple(np.full(one.shape[:-1], np.nan) for one in arrays)  # another touches
-            return (
-                np.array(moves),
-                run.v - plain.v,
-                log.force_world - plain.contacts.force_world,
-                log.depth - plain.contacts.depth,
-            )
+            forces, depths = log.force_world, log.depth
+            changes = forces - plain.contacts.force_world, depths - plain.contacts.depth
+            return np.array(moves), run.v - plain.v, *changes
 
         errors = {}
         # What hardly matters is measured by what is alike: spins by velocities.
@@ -134,8 +128,7 @@ class Case:
         known = max(1e-13, error * float(getattr(self.integrator, "rtol", 0.0)))
         resolved = [known * max(float(np.abs(one).max(initial=0.0)), 1e-3) for one in sizes]
         # A touch within a step of fixed length leaves kinks, one a step.
-        fixed = hasattr(self.integrator, "dt")
-        shares = (1e-5, 1e-4, 1e-6) if fixed else (1e-3, 1e-2, 1e-4, 1e-5)
+        shares = (1e-5, 1e-4, 1e-6) if hasattr(self.integrator, "dt") else (1e-3, 1e-2, 1e-4, 1e-5)
         for k, column in enumerate(columns):
             alike = [j for j, kind in enumerate(kinds) if kind == kinds[k]]
             scale, ahead = self.scale(column, depth)

@@ -14,13 +14,14 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-ROOT = Path(__file__).parent.parent
+from tests.texts import DATA
+
+ROOT = DATA.parents[1]
 NO_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4"}
 OLDER = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX,-AVX2,-AVX512F,-AVX512VL,-SSE4_2,-SSE4_1",
@@ -40,12 +41,11 @@ def contacts() -> str:
     from tests import meshes
 
     rng = np.random.default_rng(1)
-    blade = sp.Shell.from_file(ROOT / "tests" / "data" / "corpus" / "bladex_upper.stl", unit="m")
-    shells = [blade]
+    shells = [sp.Shell.from_file(DATA / "corpus" / "bladex_upper.stl", unit="m")]
     for vertices, elements in (meshes.icosphere(2, 0.4), meshes.dome(6), meshes.crumpled(5)):
         # NumPy made them, with last bits of its own: away with those.
         shells.append(sp.Shell(np.float32(vertices).astype(np.float64), elements))
-    columns = []
+    columns: list[Any] = []
     for shell in shells:
         points = shell.box[0] + rng.random((60, 3)) * (shell.box[1] - shell.box[0])
         near = shell.closest_points(points)
@@ -65,8 +65,7 @@ def laws() -> str:
     depths = 0.01 * np.random.default_rng(2).random(500)
     made = [sp.ImpactLaw(1e5, e, 100.0) for e in (1.0, 1.5, 2.0)] + [sp.HuntCrossleyLaw(1e6)]
     columns = [f(d) for law in made for f in (law.normal_force, law.energy) for d in depths]
-    friction = sp.CoulombFriction(0.5, 0.3, 0.001, 0.005)
-    return digest([*columns, *map(friction.coefficient, depths)])
+    return digest([*columns, *map(sp.CoulombFriction(0.5, 0.3, 0.001, 0.005).coefficient, depths)])
 
 
 def runs() -> str:
@@ -83,10 +82,8 @@ def runs() -> str:
 
 def bits(environment: dict[str, str]) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "tests.test_bits"]
-    alone = {k: v for k, v in os.environ.items() if k not in OLDER}
-    return subprocess.Popen(
-        command, env={**alone, **environment}, cwd=ROOT, stdout=subprocess.PIPE, text=True
-    )
+    env = {k: v for k, v in os.environ.items() if k not in OLDER} | environment
+    return subprocess.Popen(command, env=env, cwd=ROOT, stdout=subprocess.PIPE, text=True)
 
 
 @pytest.fixture(scope="module")

@@ -9,39 +9,26 @@ from sphshell_pin.errors import NameNotFound, ResultError
 from sphshell_pin.plot import plot_contact_map, plot_result
 from sphshell_pin.plot.contact_map import element_impulses
 from sphshell_pin.plot.on_shell import eye_direction
+from tests import meshes
 from tests.test_plot import texts
 from tests.view import stand_ins
 
 
-def grid(cells=4, size=1.0):
+def grid(cells=4):
     """A square of cells x cells quads at z = 0; element number = row * cells + column."""
-    side = np.linspace(-0.5 * size, 0.5 * size, cells + 1)
-    x, y = np.meshgrid(side, side)
-    vertices = np.column_stack((x.ravel(), y.ravel(), np.zeros(x.size)))
-    n = cells + 1
-    elements = [
-        [r * n + c, r * n + c + 1, (r + 1) * n + c + 1, (r + 1) * n + c]
-        for r in range(cells)
-        for c in range(cells)
-    ]
-    return sp.Shell(vertices, elements, name="grid")
+    return sp.Shell(*meshes.grid_plate(cells, cells, quads=True), name="grid")
 
 
 def on(shell, rows, pairs=("tip",), t=(0.0, 1.0, 3.0, 4.0)):
     """Result and scene of a ball with these contacts on `shell`."""
-    model = stand_ins.ball_model()
-    scene = stand_ins.a_scene(
-        model, *(stand_ins.contact_pair(model, "ball", 0.05, shell, name=n) for n in pairs)
-    )
-    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (len(t), 1))
-    return stand_ins.a_result(t, q, rows, pairs), scene
+    q = np.tile(stand_ins.ball_configuration(), (len(t), 1))
+    return stand_ins.a_result(t, q, rows, pairs), stand_ins.ball_scene(shell, names=pairs)
 
 
-def painted(axis, collection=0):
+def painted(axis):
     """Elements of a picture: their middles (m, 3) in its unit, and their colors (m, 4)."""
-    polygons = axis.collections[collection]
-    corners = np.array(polygons._faces)[:, :4]
-    return corners.mean(axis=1), polygons._facecolor3d
+    polygons = axis.collections[0]
+    return np.array(polygons._faces)[:, :4].mean(axis=1), polygons._facecolor3d
 
 
 ROWS = [
@@ -57,11 +44,8 @@ def test_elements_take_force_over_time():
     result, _ = on(grid(), ROWS, ("tip", "toe"))
     # The rows at 0, 1, 3, 4 s stand for 0.5, 1.5, 1.5, 0.5 s: the trapezoidal rule.
     impulse = element_impulses(result, [0, 1], 16)
-    assert impulse[5] == pytest.approx(0.5 * 2 + 1.5 * 5)
-    assert impulse[6] == pytest.approx(1.5 * 8 + 0.5 * 9)
+    np.testing.assert_allclose(impulse[[5, 6]], [0.5 * 2 + 1.5 * 5, 1.5 * 8 + 0.5 * 9])
     assert np.count_nonzero(impulse) == 2
-    force = np.array([2.0, 5.0, 8.0, 9.0])
-    assert impulse.sum() == pytest.approx(np.trapezoid(force, result.t))
     np.testing.assert_allclose(element_impulses(result, [1], 16)[[5, 6]], [0, 12.0])
 
 
@@ -71,7 +55,7 @@ def test_the_touched_elements_are_colored_where_they_are():
     middles, colors = painted(figure.axes[0])
     assert len(middles) == 16
     bright = np.ptp(colors[:, :3], axis=1) > 0.2
-    np.testing.assert_allclose(middles[bright], [[-0.125, -0.125, 0.0], [0.125, -0.125, 0.0]])
+    np.testing.assert_allclose(middles[bright], [[-0.125, -0.125, 0.0], [-0.125, 0.125, 0.0]])
     assert {"tip", "toe"} <= set(texts(figure))
     assert figure.axes[-1].get_ylabel() == "normal impulse on each element [N s]"
 
@@ -87,44 +71,24 @@ def test_the_eye_is_before_the_surface_a_little_aside():
 
 
 def test_a_solid_held_from_both_sides_has_two_pictures():
-    box = sp.Shell(
-        np.array(np.meshgrid(*3 * [(-0.5, 0.5)], indexing="ij")).reshape(3, -1).T,
-        [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
-        name="box",
-    )
+    box = sp.Shell(*meshes.cube(quads=True), name="box")
     # Elements 0 and 1 are the faces towards -x and +x.
-    rows = [
-        {"row": 1, "element": 0, "point_world": [-0.5, 0, 0], "normal_world": [-1.0, 0, 0]},
-        {
-            "row": 1,
-            "pair": 1,
-            "element": 1,
-            "point_world": [0.5, 0, 0],
-            "normal_world": [1.0, 0, 0],
-            "normal_force": 3.0,
-        },
-    ]
+    left = {"row": 1, "element": 0, "point_world": [-0.5, 0, 0], "normal_world": [-1.0, 0, 0]}
+    right = {"row": 1, "element": 1, "point_world": [0.5, 0, 0], "normal_world": [1.0, 0, 0]}
+    rows = [left, {**right, "pair": 1, "normal_force": 3.0}]
     figure = plot_contact_map(*on(box, rows, ("thumb", "index")))
-    titles = [axis.get_title() for axis in figure.axes]
-    assert titles[:2] == ["box", "box, the other side"]
-    for axis, own, other in (
-        (figure.axes[0], "index", "thumb"),
-        (figure.axes[1], "thumb", "index"),
-    ):
-        names = {text.get_text().strip() for text in axis.texts}
-        assert own in names
-        assert other not in names
+    assert [axis.get_title() for axis in figure.axes][:2] == ["box", "box, the other side"]
+    for axis, own in zip(figure.axes[:2], ("index", "thumb"), strict=True):
+        assert {text.get_text().strip() for text in axis.texts} & {"index", "thumb"} == {own}
 
 
 def test_a_fine_mesh_is_colored_as_wide_as_a_line(monkeypatch):
     monkeypatch.setattr("sphshell_pin.plot.on_shell.MOST_PAINTED", 5_000)
-    shell = grid(cells=150)
     rows = [
         {"row": k % 4, "element": 151 * k, "point_world": [-0.5 + k / 150, -0.5 + k / 150, 0]}
         for k in range(150)
     ]
-    axis = plot_contact_map(*on(shell, rows)).axes[0]
-    ground, strip = axis.collections
+    ground, strip = plot_contact_map(*on(grid(150), rows)).axes[0].collections
     assert len(strip._faces) == 150
     assert strip.get_linewidth()[0] > 2.0
     # Fewer, larger elements replace the others, and leave no hole.
@@ -161,17 +125,13 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
 
 
 def test_of_a_large_shell_the_part_that_was_touched_is_shown():
-    shell = grid(cells=40)
     rows = [
-        {"row": k, "element": 820 + k, "point_world": [0.0125 + 0.025 * k, 0.0125, 0]}
+        {"row": k, "element": 820 + k, "point_world": [0.0125, 0.0125 + 0.025 * k, 0]}
         for k in range(3)
     ]
-    result, scene = on(shell, rows)
-    axis = plot_contact_map(result, scene).axes[0]
+    axis = plot_contact_map(*on(grid(40), rows)).axes[0]
     assert axis.get_xlabel() == "x of the shell [mm]"
-    middles, _ = painted(axis)
-    assert 3 <= len(middles) < 400
+    assert 3 <= len(painted(axis)[0]) < 400
     # What was touched is inside.
-    for (low, high), x in zip((axis.get_xlim(), axis.get_ylim()), (37.5, 12.5), strict=True):
-        assert low < x < high
-        assert high - low < 350.0
+    for (low, high), x in zip((axis.get_xlim(), axis.get_ylim()), (12.5, 37.5), strict=True):
+        assert low < x < high < low + 350.0

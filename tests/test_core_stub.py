@@ -32,12 +32,10 @@ def members(text: str) -> dict[str, list[tuple[str, bool]]]:
             elif isinstance(node, ast.AnnAssign):
                 found[owner + ast.unparse(node.target)] = []
             elif isinstance(node, ast.FunctionDef) and node.name.strip("_") in (node.name, "init"):
-                names = [
-                    one.arg
-                    for one in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
-                ]
-                given = len(node.args.defaults) + sum(map(bool, node.args.kw_defaults))
-                arguments = [(name, k >= len(names) - given) for k, name in enumerate(names)]
+                of = node.args
+                names = [one.arg for one in (*of.posonlyargs, *of.args, *of.kwonlyargs)]
+                first = len(names) - len(of.defaults) - sum(map(bool, of.kw_defaults))
+                arguments = [(name, k >= first) for k, name in enumerate(names)]
                 found.setdefault(owner + node.name, [one for one in arguments if one[0] != "self"])
 
     read(ast.parse(text).body, "")

@@ -20,6 +20,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.base import cache
 from sphshell_pin.dynamics.compiled.robot import compile_robot
+from tests import meshes
 
 ROOT = Path(__file__).parent.parent
 EXAMPLE = ROOT / "docs" / "examples" / "cpp"
@@ -35,20 +36,15 @@ CACHE = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else 
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 
 
-def call(*command: object, cwd: Path = ROOT) -> str:
-    """Return what the command prints; fail with all of it if it fails."""
+def call(*command: object, cwd: Path = ROOT, fails: bool = False, given: str | None = None) -> str:
+    """Return what the command prints, `given` this input; fail where it does, or does not."""
     # The programs that pip has installed come first: cmake, ninja.
     path = os.pathsep.join([sysconfig.get_path("scripts"), os.environ["PATH"]])
-    done = subprocess.run(
-        [shutil.which(str(command[0]), path=path) or str(command[0]), *map(str, command[1:])],
-        cwd=cwd,
-        env={**ENVIRONMENT, "PATH": path},
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        check=False,
-    )
-    assert done.returncode == 0, f"{command}\n{done.stdout}"
+    words = [shutil.which(str(command[0]), path=path) or command[0], *command[1:]]
+    more = {"env": {**ENVIRONMENT, "PATH": path}, "cwd": cwd, "text": True}
+    both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    done = subprocess.run([*map(str, words)], check=False, input=given, **both, **more)
+    assert (done.returncode != 0) == fails, f"{command}\n{done.stdout}"
     return done.stdout
 
 
@@ -109,13 +105,9 @@ def test_the_example_comes_to_the_numbers_of_python(built):
 
     model = pin.buildModelFromUrdf(str(urdf))
     corners = [[0.07, -0.1, 0.0], [0.07, 0.1, 0.0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]]
-    scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(0.010, "tip"),
-        sp.Shell(corners, [[0, 1, 2, 3]]),
-        law=sp.ImpactLaw(1e6, 1.5, 20.0, 1e-4),
-        friction=sp.CoulombFriction(0.5, 0.4, 0.005, 0.05),
-    )
+    scene, wall = sp.Scene(model), sp.Shell(corners, [[0, 1, 2, 3]])
+    laws = sp.ImpactLaw(1e6, 1.5, 20.0, 1e-4), sp.CoulombFriction(0.5, 0.4, 0.005, 0.05)
+    scene.add_contact(sp.Sphere(0.010, "tip"), wall, "universe", None, *laws)
     data, dt = model.createData(), 2e-5
     q, v = np.array([0.2, 0.6, 0.4]), np.zeros(3)
     wanted = q + 0.2
@@ -126,11 +118,7 @@ def test_the_example_comes_to_the_numbers_of_python(built):
     contacts = scene.contacts(q, v)
     np.testing.assert_allclose(printed, q, rtol=1e-10)
     np.testing.assert_allclose([force, depth], [*contacts.normal_force, *contacts.depth], rtol=1e-8)
-    # One without its argument says how it is called.
-    alone = [built / "cpp-finger" / "finger_on_wall"]
-    usage = subprocess.run(alone, capture_output=True, text=True, check=False, env=ENVIRONMENT)
-    assert usage.returncode == 2
-    assert "usage: finger_on_wall URDF" in usage.stderr
+    assert "usage: finger_on_wall URDF" in call(built / "cpp-finger" / "finger_on_wall", fails=True)
 
 
 @pytest.mark.parametrize("name", ["laws", "surfaces", "scenes", "page"])
@@ -141,15 +129,12 @@ def test_in_cpp(built, name):
 
 def test_contacts_are_those_of_python_to_the_bit(built):
     rng = np.random.default_rng(3)
-    side = 9
-    x, y = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
-    height = 0.5 * np.sin(x) * np.cos(0.7 * y) + 0.2 * rng.standard_normal(x.shape)
-    vertices = np.stack([x, y, height], axis=-1).reshape(-1, 3)
-    corner = (x * side + y)[:-1, :-1].ravel()
-    quads = np.stack([corner, corner + side, corner + side + 1, corner + 1], axis=1)
+    vertices, quads = meshes.grid_plate(8, 8, size=8.0, quads=True)
+    x, y = vertices.T[:2]
+    vertices[:, 2] = 0.5 * np.sin(x) * np.cos(0.7 * y) + 0.2 * rng.standard_normal(len(x))
     quads[::3, 3] = -1  # triangles, and holes beside them
     radius = rng.uniform(0.2, 2, 300)
-    center = rng.uniform([0, 0, -1], [side, side, 2], (300, 3))
+    center = rng.uniform([-4.5, -4.5, -1], [4.5, 4.5, 2], (300, 3))
     method = rng.integers(0, 3, 300)
 
     text = [f"{len(vertices)} {len(quads)} {len(center)}"]
@@ -157,10 +142,7 @@ def test_contacts_are_those_of_python_to_the_bit(built):
     text += [" ".join(map(str, row)) for row in quads.tolist()]
     for place, size, how in zip(center.tolist(), radius.tolist(), method, strict=True):
         text.append(" ".join(map(repr, [*place, size])) + f" {how}")
-    program, given = [built / "cpp-tests" / "contacts_of"], "\n".join(text)
-    done = subprocess.run(
-        program, input=given, capture_output=True, text=True, check=True, env=ENVIRONMENT
-    )
+    printed = call(built / "cpp-tests" / "contacts_of", given="\n".join(text))
 
     shell = sp.Shell(vertices, quads, clean=False)
     rows = []
@@ -170,28 +152,25 @@ def test_contacts_are_those_of_python_to_the_bit(built):
         rows.append(np.column_stack([np.full(len(found.depth), k), *columns]))
     wanted = np.concatenate(rows)
     assert len(wanted) > 300
-    np.testing.assert_array_equal(np.loadtxt(done.stdout.splitlines()), wanted)
+    np.testing.assert_array_equal(np.loadtxt(printed.splitlines()), wanted)
 
 
 def test_a_loop_of_its_own_moves_a_compiled_robot_as_pinocchio_does(built, monkeypatch, tmp_path):
     monkeypatch.setenv(cache.CACHE, str(tmp_path / "cache"))
     panda = example_robot_data.load("panda")
-    path = compile_robot(panda.model)
-    printed = call(built / "cpp-tests" / "press", panda.urdf, path, 10, 40)
+    printed = call(built / "cpp-tests" / "press", panda.urdf, compile_robot(panda.model), 10, 40)
     found = re.search(r"touching 1, apart (\S+)", printed)
     assert found, printed
     assert float(found[1]) < 1e-13
-    refused = [built / "cpp-tests" / "press", panda.urdf, ROOT / "README.md", "1", "2"]
-    done = subprocess.run(refused, capture_output=True, text=True, check=False, env=ENVIRONMENT)
-    assert done.returncode
-    assert "must be what compile_robot() made for this model" in done.stderr
+    other = panda.urdf, ROOT / "README.md", 1, 2
+    refused = call(built / "cpp-tests" / "press", *other, fails=True)
+    assert "must be what compile_robot() made for this model" in refused
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="nm lists the names of an ELF library")
 def test_only_the_public_names_are_exported(built):
-    names = call(
-        "nm", "-D", "--defined-only", built / "cpp-installed" / "lib" / "libsphshell_pin.so"
-    )
+    library = built / "cpp-installed" / "lib" / "libsphshell_pin.so"
+    names = call("nm", "-D", "--defined-only", library)
     assert "_ZN12sphshell_pin5Scene" in names
     assert "_ZN8sphshell" not in names
 

@@ -7,6 +7,7 @@ import shlex
 import sys
 import tomllib
 from collections import defaultdict
+from collections.abc import Iterator
 from decimal import Decimal
 from pathlib import Path
 from types import ModuleType
@@ -22,14 +23,9 @@ from tests.slow import LIST as SLOW
 from tests.studies import mostly_studies
 
 ROOT = Path(__file__).parent.parent
-PAGES = [
-    ROOT / "README.md",
-    ROOT / "CHANGELOG.md",
-    ROOT / "CONTRIBUTING.md",
-    ROOT / "SECURITY.md",
-    ROOT / "scenarios" / "README.md",
-    *sorted((ROOT / "docs").rglob("*.md")),
-]
+PAGES = [ROOT / f"{one}.md" for one in ("README", "CHANGELOG", "CONTRIBUTING", "SECURITY")]
+PAGES += [ROOT / "scenarios" / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+TEXTS = {page: page.read_text("utf-8") for page in PAGES}
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 INLINE_CODE = re.compile(r"`[^`\n]*`")
 LINK = re.compile(r"\[[^\]]*\]\(([^)\s]+)\)")
@@ -37,7 +33,7 @@ HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 PRINT = re.compile(r"^\s*print\(.*\)  # (.+)$")
 PRINTED = re.compile(r"<!-- printed by: (.+) -->\s*```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-PRINTING = [page for page in PAGES if PRINTED.search(page.read_text("utf-8"))]
+PRINTING = [page for page in PAGES if PRINTED.search(TEXTS[page])]
 LONG = ("grasping", "export", "sweeps")  # what they show takes long
 # A line of a block, or code within a line; what follows may go on behind a backslash.
 COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.MULTILINE)
@@ -45,12 +41,16 @@ COMMAND = re.compile(r"(?:^ *(?:\$ )?|`)(sphshell-pin (?:[^`\n\\]|\\\n)*)", re.M
 
 def blocks(page: Path, language: str) -> list[tuple[int, str]]:
     """Return the blocks of one language: the number of lines above each, and its text."""
-    text = page.read_text(encoding="utf-8")
-    return [
-        (text.count("\n", 0, found.start(2)), found[2])
-        for found in FENCE.finditer(text)
-        if found[1] == language
-    ]
+    found = (one for one in FENCE.finditer(TEXTS[page]) if one[1] == language)
+    return [(TEXTS[page].count("\n", 0, one.start(2)), one[2]) for one in found]
+
+
+def links(page: Path) -> Iterator[tuple[str, Path, str]]:
+    """Yield the links into the repository: as written, the file, and the anchor in it."""
+    for link in LINK.findall(INLINE_CODE.sub("", FENCE.sub("", TEXTS[page]))):
+        path, _, anchor = link.partition("#")
+        if not re.match(r"[a-z]+:", link):
+            yield link, (page.parent / path).resolve() if path else page, anchor
 
 
 def with_blocks(language: str) -> list[Path]:
@@ -63,9 +63,8 @@ def name_of(page: Path) -> str:
 
 def anchors(page: Path) -> set[str]:
     """Return what GitHub makes of the headings."""
-    text = FENCE.sub("", page.read_text(encoding="utf-8"))
-    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(text))
-    return {heading.replace(" ", "-") for heading in plain}
+    headings = HEADING.findall(FENCE.sub("", TEXTS[page]))
+    return {re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in headings}
 
 
 @pytest.mark.parametrize(
@@ -117,7 +116,7 @@ def is_near(told: str, found: str) -> bool:
 def test_the_commands_of_a_page_print_what_it_shows(page, tmp_path, monkeypatch):
     """`<!-- printed by: COMMAND -->` stands above what the last of its commands prints, in part."""
     monkeypatch.chdir(tmp_path)
-    for commands, block in PRINTED.findall(page.read_text(encoding="utf-8")):
+    for commands, block in PRINTED.findall(TEXTS[page]):
         for command in commands.split(" && "):
             done = CliRunner().invoke(app, shlex.split(command)[1:])
             assert done.exit_code == 0, done.output
@@ -136,26 +135,23 @@ def shape(line: str) -> str:
 
 @pytest.mark.parametrize("page", with_blocks("toml"), ids=name_of)
 def test_the_scenarios_of_a_page_are_valid(page, tmp_path):
-    for k, (above, text) in enumerate(blocks(page, "toml")):
-        where = f"{name_of(page)}, line {above + 1}"
-        whole = "title" in tomllib.loads(text)
-        if not whole:
-            continue
-        file = tmp_path / f"scenario_{k}.toml"
-        file.write_text(text, encoding="utf-8")
-        read_scenario(file)
-        try:
-            build(file)
-        except MissingExtra as missing:
-            pytest.skip(f"{where}: {missing}")
+    file = tmp_path / "scenario.toml"
+    for _, text in blocks(page, "toml"):
+        if "title" in tomllib.loads(text):  # whole
+            file.write_text(text, encoding="utf-8")
+            read_scenario(file)
+            try:
+                build(file)
+            except MissingExtra as missing:
+                pytest.skip(f"{name_of(page)}: {missing}")
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if COMMAND.search(page.read_text("utf-8"))], ids=name_of
+    "page", [page for page in PAGES if COMMAND.search(TEXTS[page])], ids=name_of
 )
 def test_the_commands_of_a_page_exist_with_their_options(page):
     group = typer.main.get_command(app)
-    for written in COMMAND.findall(page.read_text(encoding="utf-8")):
+    for written in COMMAND.findall(TEXTS[page]):
         line = written.replace("\\\n", " ").split(" > ")[0]
         name, *arguments = shlex.split(line, comments=True)[1:]
         if name == "--help":
@@ -168,20 +164,14 @@ def test_the_commands_of_a_page_exist_with_their_options(page):
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_the_links_of_a_page_lead_somewhere(page):
-    text = INLINE_CODE.sub("", FENCE.sub("", page.read_text(encoding="utf-8")))
-    for link in LINK.findall(text):
-        if re.match(r"[a-z]+:", link):
-            continue
-        path, _, anchor = link.partition("#")
-        target = page if not path else (page.parent / path).resolve()
+    for link, target, anchor in links(page):
         assert target.exists(), f"{link}: no such file"
-        if anchor:
-            assert anchor in anchors(target), f"{link}: no such heading"
+        assert not anchor or anchor in anchors(target), f"{link}: no such heading"
 
 
 def test_tests_that_are_named_exist():
     for page in PAGES:
-        for path in re.findall(r"`(tests/[\w/]+\.py)`", page.read_text(encoding="utf-8")):
+        for path in re.findall(r"`(tests/[\w/]+\.py)`", TEXTS[page]):
             assert (ROOT / path).exists(), f"{page.name}: {path}"
     for test in SLOW.read_text("utf-8").split():
         file, _, name = test.partition("::")
@@ -190,21 +180,16 @@ def test_tests_that_are_named_exist():
 
 
 def test_no_page_is_an_orphan():
-    linked = set()
-    for page in PAGES:
-        for link in LINK.findall(page.read_text(encoding="utf-8")):
-            if not re.match(r"[a-z]+:", link):
-                linked.add((page.parent / link.partition("#")[0]).resolve())
-    start = ROOT / "docs" / "index.md"  # of the site
-    assert {page for page in PAGES if ROOT / "docs" in page.parents} - {start} <= linked
-    assert set((ROOT / "docs" / "measured").iterdir()) <= linked
-    shown = ROOT / "docs" / "pictures"
-    measured = json.loads((ROOT / "docs/measured/validation.json").read_text(encoding="utf-8"))
+    docs = ROOT / "docs"
+    linked = {target for page in PAGES for _, target, _ in links(page)}
+    assert {page for page in PAGES if docs in page.parents} - {docs / "index.md"} <= linked
+    assert set((docs / "measured").iterdir()) <= linked
+    measured = json.loads((docs / "measured/validation.json").read_text(encoding="utf-8"))
     for section in measured["sections"]:
-        linked |= {shown / file for file, _ in section.get("pictures", ())}
-    cards = (ROOT / "docs/measured/gallery.json").read_text(encoding="utf-8")
-    linked |= {ROOT / "docs" / link for link in LINK.findall(cards)}
-    pictures = {path for path in shown.rglob("*") if path.is_file()}
+        linked |= {docs / "pictures" / file for file, _ in section.get("pictures", ())}
+    cards = (docs / "measured/gallery.json").read_text(encoding="utf-8")
+    linked |= {docs / link for link in LINK.findall(cards)}
+    pictures = {path for path in (docs / "pictures").rglob("*") if path.is_file()}
     assert pictures <= linked
     assert all(picture.stat().st_size < 400_000 for picture in pictures)
 
@@ -213,7 +198,7 @@ def test_the_tables_of_the_pages_are_those_of_today(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT / "docs" / "site"))
     tables = importlib.import_module("tables")
     for page in tables.PAGES:
-        text = page.read_text(encoding="utf-8")
+        text = TEXTS[page]
         assert tables.filled(text) == text, f"{page.name} is stale: python docs/site/tables.py"
         marks = re.findall(rf"^<!-- (?:{'|'.join(tables.SHOWN)}): .*-->$", text, re.M)
         assert len(marks) == len(tables.BLOCK.findall(text)), page.name

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 import sphshell_pin
+from tests.programs import module_of
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -24,18 +25,15 @@ WORKFLOWS = ROOT / ".github" / "workflows"
 NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
+INSTALL = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
+
+
 def test_it_is_compiled_against_the_versions_it_runs_with():
-    built = {NAME.match(one)[0]: one.split("==")[-1] for one in PROJECT["build-system"]["requires"]}
-    runs = {NAME.match(one)[0]: one.split("==")[-1] for one in PROJECT["project"]["dependencies"]}
+    stated = PROJECT["build-system"]["requires"], PROJECT["project"]["dependencies"]
+    built, runs = ({NAME.match(one)[0]: one.split("==")[-1] for one in each} for each in stated)
     for name in ("pin", "coal"):
         assert built[name] == runs[name], name
         assert importlib.metadata.version(name).startswith(runs[name].rstrip("*"))
-
-
-def test_every_folder_that_is_installed_exists():
-    for target, source in PROJECT["tool"]["scikit-build"]["wheel"]["packages"].items():
-        assert (ROOT / source / "__init__.py").is_file(), source
-        assert target.split("/")[0] in ("sphshell_pin", "pytest_sphshell_pin")
 
 
 def test_versions_and_entry_points_agree():
@@ -50,21 +48,16 @@ def test_versions_and_entry_points_agree():
 
 
 def test_every_extra_is_in_the_table_and_in_all():
-    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8")
-    table = dict(re.findall(r"^\| `(\w+)` \| (.+?) \|", page, re.MULTILINE))
+    table = re.findall(r"^\| `(\w+)` \|", INSTALL, re.MULTILINE)
     assert set(EXTRAS) <= set(table), "the table of extras in docs/install.md lacks some"
-    assert set(table) & {"all"}
     (everything,) = EXTRAS["all"]
-    inside = set(everything.partition("[")[2].rstrip("]").split(","))
-    assert inside == set(EXTRAS) - {"all"}
+    assert set(everything.partition("[")[2].rstrip("]").split(",")) == set(EXTRAS) - {"all"}
 
 
 def test_an_extra_that_an_error_names_exists():
-    source = "\n".join(
-        file.read_text(encoding="utf-8")
-        for folder in ("sphshell_pin", "robots", "scenarios", "benchmarks")
-        for file in (ROOT / folder).rglob("*.py")
-    )
+    folders = ("sphshell_pin", "robots", "scenarios", "benchmarks")
+    files = (file for folder in folders for file in (ROOT / folder).rglob("*.py"))
+    source = "\n".join(file.read_text(encoding="utf-8") for file in files)
     named = set(re.findall(r'MissingExtra\(\s*"[^"]+",\s*"(\w+)"', source))
     assert named
     assert named <= set(EXTRAS)
@@ -98,42 +91,38 @@ def test_the_policy_of_the_wheels_is_that_of_pinocchios():
     for name in ("pin", "coal"):
         wheel = importlib.metadata.distribution(name).read_text("WHEEL")
         policies |= set(re.findall(r"^Tag: .*-(manylinux_\d+_\d+)_\w+$", wheel, re.MULTILINE))
-    assert policies == {WHEELS["linux"]["manylinux-x86_64-image"]}
-    assert policies == {WHEELS["linux"]["manylinux-aarch64-image"]}
+    assert policies == {WHEELS["linux"][f"manylinux-{one}-image"] for one in ("x86_64", "aarch64")}
     assert "--plat $AUDITWHEEL_PLAT --only-plat" in WHEELS["linux"]["repair-wheel-command"]
 
 
 def load(file):
     """Return what a YAML file of the checkout says."""
     yaml = pytest.importorskip("yaml", reason="needs PyYAML, which comes with the extra docs")
+    return yaml.safe_load(in_checkout(file).read_text(encoding="utf-8"))
+
+
+def in_checkout(file):
     if not file.is_file():
         pytest.skip(f"{file.name} is part of the checkout")
-    return yaml.safe_load(file.read_text(encoding="utf-8"))
-
-
-def workflow(name):
-    return load(WORKFLOWS / f"{name}.yml")
+    return file
 
 
 def test_only_a_tag_publishes_and_only_what_was_checked():
-    release = workflow("release")
-    trigger = release[True]  # YAML 1.1 takes the key "on" for true
+    release = load(WORKFLOWS / "release.yml")
+    trigger, jobs = release[True], release["jobs"]  # YAML 1.1 takes the key "on" for true
     assert trigger["push"] == {"tags": ["v*"]}
     assert "pull_request" not in trigger
-    jobs = release["jobs"]
     publish = jobs.pop("publish")
     assert publish["if"] == "startsWith(github.ref, 'refs/tags/v')"
-    assert set(publish["needs"]) == set(jobs)
-    assert publish["permissions"] == {"id-token": "write"}  # trusted publishing: no stored token
+    assert set(publish["needs"]) == set(jobs) >= {"tests"}
+    # Trusted publishing: no stored token.
+    assert publish["permissions"] == {"id-token": "write"}
     assert release["permissions"] == {"contents": "read"}
+    assert "secrets." not in (WORKFLOWS / "release.yml").read_text(encoding="utf-8")
     for job in jobs.values():
         assert "permissions" not in job
         told = " ".join(step.get("run", "") for step in job["steps"])
         assert ".ci/check_wheel.py" in told or told.strip() == ".ci/run"
-    assert "tests" in jobs
-    assert "secrets." not in (WORKFLOWS / "release.yml").read_text(encoding="utf-8")
-    runners = set(jobs["wheels"]["strategy"]["matrix"]["runner"])
-    assert runners == {"ubuntu-24.04", "ubuntu-24.04-arm", "macos-15"}
 
 
 def test_actions_are_pinned():
@@ -150,75 +139,51 @@ def test_actions_are_pinned():
 
 def script(name):
     """Import a script of .ci/."""
-    file = ROOT / ".ci" / f"{name}.py"
-    if not file.is_file():
-        pytest.skip("the scripts of .ci are part of the checkout")
-    spec = importlib.util.spec_from_file_location(name, file)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_of(in_checkout(ROOT / ".ci" / f"{name}.py"))
 
 
 @pytest.fixture
-def check_contents():
-    return script("check_wheel").check_contents
+def faults_of(tmp_path):
+    """Returns what is wrong with a wheel of GOOD and these files; None leaves one out."""
+
+    def faults_of(change, name="a.whl"):
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            for file, data in {**GOOD, **change}.items():
+                if data is not None:
+                    archive.writestr(file, data)
+        return script("check_wheel").check_contents(tmp_path / name)
+
+    return faults_of
 
 
-GOOD = {
-    "sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so": b"\0$ORIGIN/../cmeel.prefix/lib\0",
-    **dict.fromkeys(
-        (
-            "sphshell_pin/_built_against.py",
-            "sphshell_pin/_core.pyi",
-            "sphshell_pin/py.typed",
-            "sphshell_pin/view/recording_page/page.html",
-            "sphshell_pin/view/live/page/page.js",
-            "sphshell_pin/robots/urdf/ball.urdf",
-            "sphshell_pin/robots/meshes/gear_20.stl",
-            "sphshell_pin/scenario/drafting/draft.template",
-            "sphshell_pin/scenarios/sphere_on_shell.toml",
-            "sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt",
-            "pytest_sphshell_pin/__init__.py",
-            "sphshell_pin-1.0.dist-info/METADATA",
-        ),
-        b"",
-    ),
-}
-BAD = {
-    "a bundled library": ({"sphshell_pin.libs/libboost_python311-1.so.1.90.0": b""}, "outside"),
-    "sources": ({"sphshell_pin/cpp/shell/bvh.cpp": b""}, "bvh.cpp does not belong"),
-    "tests": ({"sphshell_pin/tests/test_a.py": b""}, "does not belong"),
-    "a core that finds no libraries": (
-        {"sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so": b"$ORIGIN"},
-        "cmeel.prefix",
-    ),
-    "benchmarks": ({"sphshell_pin/benchmarks/growth.py": b""}, "does not belong"),
-    "no scenarios": ({"sphshell_pin/scenarios/sphere_on_shell.toml": None}, "no sphshell_pin/scen"),
-    "no plugin": ({"pytest_sphshell_pin/__init__.py": None}, "no pytest_sphshell_pin"),
-    "no versions that it was compiled against": (
-        {"sphshell_pin/_built_against.py": None},
-        "no sphshell_pin/_built_against.py",
-    ),
-    "no types": ({"sphshell_pin/py.typed": None}, "no sphshell_pin/py.typed"),
-}
+CORE = "sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so"
+FILES = """sphshell_pin/_built_against.py sphshell_pin/_core.pyi sphshell_pin/py.typed
+    sphshell_pin/view/recording_page/page.html sphshell_pin/view/live/page/page.js
+    sphshell_pin/robots/urdf/ball.urdf sphshell_pin/robots/meshes/gear_20.stl
+    sphshell_pin/scenario/drafting/draft.template sphshell_pin/scenarios/sphere_on_shell.toml
+    sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt pytest_sphshell_pin/__init__.py
+    sphshell_pin-1.0.dist-info/METADATA"""
+GOOD = {CORE: b"\0$ORIGIN/../cmeel.prefix/lib\0", **dict.fromkeys(FILES.split(), b"")}
+BAD = [
+    ("sphshell_pin.libs/libboost_python311-1.so.1.90.0", b"", "outside"),
+    ("sphshell_pin/cpp/shell/bvh.cpp", b"", "bvh.cpp does not belong"),
+    ("sphshell_pin/tests/test_a.py", b"", "does not belong"),
+    ("sphshell_pin/benchmarks/growth.py", b"", "does not belong"),
+    (CORE, b"$ORIGIN", "cmeel.prefix"),
+    ("sphshell_pin/scenarios/sphere_on_shell.toml", None, "no sphshell_pin/scen"),
+    ("pytest_sphshell_pin/__init__.py", None, "no pytest_sphshell_pin"),
+    ("sphshell_pin/_built_against.py", None, "no sphshell_pin/_built_against.py"),
+    ("sphshell_pin/py.typed", None, "no sphshell_pin/py.typed"),
+]
 
 
-def pack(file, contents):
-    with zipfile.ZipFile(file, "w") as archive:
-        for name, data in contents.items():
-            if data is not None:
-                archive.writestr(name, data)
-    return file
+def test_a_good_wheel_passes_its_check(faults_of):
+    assert faults_of({}) == []
 
 
-def test_a_good_wheel_passes_its_check(tmp_path, check_contents):
-    assert check_contents(pack(tmp_path / "good.whl", GOOD)) == []
-
-
-@pytest.mark.parametrize("what", BAD)
-def test_a_wheel_is_refused_with(what, tmp_path, check_contents):
-    change, said = BAD[what]
-    faults = check_contents(pack(tmp_path / "bad.whl", {**GOOD, **change}))
+@pytest.mark.parametrize(("file", "data", "said"), BAD)
+def test_a_wheel_is_refused_with(file, data, said, faults_of):
+    faults = faults_of({file: data})
     assert any(said in fault for fault in faults), faults
 
 
@@ -226,14 +191,13 @@ def test_a_wheel_is_refused_with(what, tmp_path, check_contents):
     ("tag", "newer"),
     [("manylinux_2_28_x86_64", "GLIBCXX_3.4.30, GLIBC_2.35"), ("linux_x86_64", None)],
 )
-def test_symbols_must_be_those_of_the_tag(tag, newer, tmp_path, check_contents):
-    (core,) = (name for name in GOOD if name.endswith(".so"))
-    symbols = (
-        b"\0GLIBC_2.2.5\0GLIBC_2.28\0GLIBC_2.35\0GLIBCXX_3.4.24\0GLIBCXX_3.4.30\0CXXABI_1.3.9\0"
+def test_symbols_must_be_those_of_the_tag(tag, newer, faults_of):
+    names = "GLIBC_2.2.5 GLIBC_2.28 GLIBC_2.35 GLIBCXX_3.4.24 GLIBCXX_3.4.30 CXXABI_1.3.9"
+    symbols = "".join(f"\0{name}" for name in names.split()) + "\0"
+    faults = faults_of(
+        {CORE: GOOD[CORE] + symbols.encode()}, f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
     )
-    wheel = tmp_path / f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
-    faults = check_contents(pack(wheel, {**GOOD, core: GOOD[core] + symbols}))
-    assert faults == ([f"{core} needs {newer}, which {tag[:14]} does not have"] if newer else [])
+    assert faults == ([f"{CORE} needs {newer}, which {tag[:14]} does not have"] if newer else [])
 
 
 def test_the_tests_of_a_wheel_exist():
@@ -245,15 +209,8 @@ def test_the_tests_of_a_wheel_exist():
 
 
 def test_the_license_of_every_package_is_stated():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = project["optional-dependencies"]
-    own = [name for name in extras if name not in {"all", "test", "docs"}]
-    needed = {*project["dependencies"], *(one for name in own for one in extras[name])}
+    own = [EXTRAS[name] for name in EXTRAS if name not in {"all", "test", "docs"}]
+    needed = {*PROJECT["project"]["dependencies"], *(one for extra in own for one in extra)}
     names = {re.match(r"[\w-]+", one)[0] for one in needed} - {"sphshell-pin"}
-    page = (ROOT / "docs" / "install.md").read_text(encoding="utf-8").partition("## Licenses")[2]
-    assert names == set(
-        re.findall(
-            r"`([\w-]+)`",
-            "".join(line.split("|")[1] for line in page.splitlines() if line.startswith("| `")),
-        )
-    )
+    rows = re.findall(r"^\| (`[^|]*)\|", INSTALL.partition("## Licenses")[2], re.MULTILINE)
+    assert names == {name for row in rows for name in re.findall(r"`([\w-]+)`", row)}

@@ -35,8 +35,7 @@ def trip(request: pytest.FixtureRequest) -> Trip:
 
 def touching(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[Any, Any, Any]:
     """Let the ball's center touch a plane 20 mm below the shell's vertices."""
-    depth = 0.03 - pose_i.translation[2]
-    return [pose_i.translation - [0, 0, 0.05]], [[0, 0, 1.0]], [depth]
+    return [pose_i.translation - [0, 0, 0.05]], [[0, 0, 1.0]], [(0.03 - pose_i.translation[2])]
 
 
 def bumpy_scene() -> sp.Scene:
@@ -83,20 +82,19 @@ def test_a_process_of_its_own_computes_the_same_bits() -> None:
     assert result.scene.pairs[0].law == LAWS[0]
 
 
-def fail(kind: str) -> None:
-    if kind == "value":
-        sp.Sphere(-1.0, "ball")
-    elif kind == "name":
-        bumpy_scene().pair("nobody")
-    else:
-        simulation = sp.Simulation(sp.Scene(models.ball()), sp.SemiImplicitEuler(1e-3))
-        simulation.run(START, None, 1.0, lambda t, q, v, contacts: np.full(6, 1e300))
+FAILURES = {
+    "value": lambda: sp.Sphere(-1.0, "ball"),
+    "name": lambda: bumpy_scene().pair("nobody"),
+    "diverged": lambda: sp.Simulation(sp.Scene(models.ball()), sp.SemiImplicitEuler(1e-3)).run(
+        START, None, 1.0, lambda t, q, v, contacts: np.full(6, 1e300)
+    ),
+}
 
 
-@pytest.mark.parametrize("kind", ["value", "name", "diverged"])
+@pytest.mark.parametrize("kind", FAILURES)
 def test_an_error_passes_between_processes(kind: str, trip: Trip) -> None:
     with pytest.raises(sp.SphshellError) as raised:
-        fail(kind)
+        FAILURES[kind]()
     again = trip(raised.value)
     assert type(again) is type(raised.value)
     assert str(again) == str(raised.value)

@@ -34,11 +34,7 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
 
     scene, result = stand_ins.ball_on_plate()
     paths = plot.save_figures(result, tmp_path / "new", scene)
-    assert [path.name for path in paths] == [
-        "force_and_depth.png",
-        "energy.png",
-        "contact_map.png",
-    ]
+    assert [path.stem for path in paths] == ["force_and_depth", "energy", "contact_map"]
     for path in paths:
         pixels = np.asarray(Image.open(path).convert("L"))
         assert pixels.shape[1] >= 900
@@ -47,16 +43,13 @@ def test_the_figures_are_written_and_not_blank(tmp_path):
 
 def test_axes_carry_their_units():
     scene, result = stand_ins.ball_on_plate()
-    assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(
-        plot.plot_force_and_depth(result)
-    )
-    assert {"x of the shell [m]", "y of the shell [m]"} <= labels(
-        plot.plot_contact_map(result, scene)
-    )
-    energetic = stand_ins.a_result(
-        [0, 1], np.zeros((2, 8)), kinetic=np.array([0, 2e-3]), residual=np.array([0, 3e-9])
-    )
-    assert {"energy [mJ]", "residual [nJ]"} <= labels(plot.plot_energy(energetic))
+    energies = {"kinetic": np.array([0, 2e-3]), "residual": np.array([0, 3e-9])}
+    energetic = stand_ins.a_result([0, 1], np.zeros((2, 8)), **energies)
+    force, energy = plot.plot_force_and_depth(result), plot.plot_energy(energetic)
+    shell = plot.plot_contact_map(result, scene)
+    assert {"force [N]", "largest depth [mm]", "time [s]"} <= labels(force)
+    assert {"x of the shell [m]", "y of the shell [m]"} <= labels(shell)
+    assert {"energy [mJ]", "residual [nJ]"} <= labels(energy)
 
 
 def test_forces_of_one_pair_add_normal_as_numbers_and_friction_as_vectors():
@@ -81,33 +74,22 @@ def test_a_run_without_contact_is_told_in_words(tmp_path):
 def test_every_shell_has_its_own_picture_and_every_pair_its_name():
     model = stand_ins.ball_model()
     shells = [stand_ins.plate(name=f"plate {k}") for k in range(3)]
+    names = [f"finger {k}" for k in range(6)]
     pairs = [
-        stand_ins.contact_pair(model, "ball", 0.05, shells[k // 2], name=f"finger {k}")
-        for k in range(6)
+        stand_ins.contact_pair(model, "ball", 0.05, shells[k // 2], name=name)
+        for k, name in enumerate(names)
     ]
-    names = [pair.name for pair in pairs]
-    rows = [
-        {"row": row, "pair": k, "point_world": [0.01 * row, 0.05 * k, 0]}
-        for row in range(5)
-        for k in range(6)
-    ]
-    q = np.tile(stand_ins.ball_configuration(np.zeros(3)), (5, 1))
-    figure = plot.plot_contact_map(
-        stand_ins.a_result(np.arange(5), q, rows, names), stand_ins.a_scene(model, *pairs)
-    )
-    written = " ".join(texts(figure))
-    assert all(name in written for name in names)
-    assert all(f"plate {k}" in written for k in range(3))
+    rows = [{"row": k, "pair": k, "point_world": [0.01 * k, 0.05 * k, 0]} for k in range(6)]
+    q = np.tile(stand_ins.ball_configuration(), (6, 1))
+    result = stand_ins.a_result(np.arange(6), q, rows, names)
+    written = " ".join(texts(plot.plot_contact_map(result, stand_ins.a_scene(model, *pairs))))
+    assert all(name in written for name in (*names, "plate 0", "plate 1", "plate 2"))
 
 
 def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
     count = MOST_PAIRS + 3
-    rows = [
-        {"row": 1, "pair": k, "normal_force": 1.0 + k, "point_world": [0.1 * k, 0, 0]}
-        for k in range(count)
-    ]
-    names = [f"pair {k}" for k in range(count)]
-    result = stand_ins.a_result([0, 1], np.zeros((2, 8)), rows, names)
+    rows = [{"row": 1, "pair": k, "normal_force": 1.0 + k} for k in range(count)]
+    result = stand_ins.a_result([0, 1], np.zeros((2, 8)), rows, [f"pair {k}" for k in range(count)])
     for kind in ("overview", "force"):
         written = " ".join(texts(plot.plot_result(result, kind)))
         assert "pair 0" not in written
@@ -118,9 +100,7 @@ def test_of_many_pairs_the_hardest_are_drawn_and_the_rest_is_mentioned():
 def test_a_long_run_keeps_its_one_row_peak():
     count = 300_000
     result = stand_ins.a_result(np.arange(count) * 1e-4, np.zeros((count, 1)), pairs=("tip",))
-    result.contacts = stand_ins.a_result(
-        [0], [[0]], [{"row": 123_457, "normal_force": 77.0, "depth": 1e-3}]
-    ).contacts
+    result.contacts = stand_ins.contact_log([{"row": 123_457, "normal_force": 77.0}])
     line = plot.plot_force_and_depth(result).axes[0].lines[0]
     assert len(line.get_xdata()) <= MOST_POINTS + 2
     assert line.get_ydata().max() == 77.0
@@ -135,7 +115,6 @@ def test_without_matplotlib_one_sentence_says_how_to_get_it(monkeypatch):
 def test_potential_energy_is_shown_from_where_it_started():
     result = without_contact()
     result.energy.potential = np.linspace(1000.0, 1001.0, 5)
-    line = next(
-        line for line in plot.plot_energy(result).axes[0].lines if "potential" in line.get_label()
-    )
+    lines = plot.plot_energy(result).axes[0].lines
+    (line,) = (one for one in lines if "potential" in one.get_label())
     assert line.get_ydata()[0] == 0.0

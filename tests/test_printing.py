@@ -16,11 +16,12 @@ import typer
 
 from sphshell_pin.cli import app, main
 from sphshell_pin.cli.common import echo, progress_bar
-from sphshell_pin.scenario import run_scenario
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study import report
 from sphshell_pin.study.report.contents import Finding, Section
 from sphshell_pin.study.report.making import Part
-from tests.scenario.files import DROP, without_pictures, write
+from tests.scenario.files import DROP, write
 
 MESH = Path(__file__).parent / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
 # In a folder of its own with drop.toml, drop.csv and results; é is in no ASCII.
@@ -82,8 +83,9 @@ def end_of(name: str, redirect, place: Path) -> tuple[int, set[str]]:
 def home(tmp_path_factory) -> Path:
     home = tmp_path_factory.mktemp("home")
     text = DROP.replace("duration = 0.05", 'duration = 0.05\nrecord = ["patch"]')
-    with without_pictures():
-        result = run_scenario(write(home, text), out=home / "results", recording=False).result
+    result, _ = simulate(build(write(home, text)))
+    (home / "results").mkdir()
+    result.save(home / "results" / "run.npz")
     rows = [f"{t},{q}" for t, q in zip(result.t[::5], result.q[::5, 2], strict=True)]
     (home / "drop.csv").write_text("\n".join(["t [s],q.root_joint.2 [m]", *rows]))
     return home
@@ -93,10 +95,8 @@ def home(tmp_path_factory) -> Path:
 @pytest.mark.parametrize("name", WORDS)
 def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypatch):
     found = Section("x", "é", findings=[Finding("a", "a", 1.0)])
-    small = functools.partial(
-        report.make_report, parts=[Part("x", "é", lambda **_: found, (1.0, 1.0))]
-    )
-    monkeypatch.setattr(report, "make_report", small)
+    parts = [Part("x", "é", lambda **_: found, (1.0, 1.0))]
+    monkeypatch.setattr(report, "make_report", functools.partial(report.make_report, parts=parts))
 
     def ended_by_ctrl_c(url: str) -> None:
         echo(url)
@@ -111,9 +111,8 @@ def test_no_command_needs_somebody_who_takes_what_it_prints(name, home, monkeypa
         shutil.copytree(home, place)
         ends[redirect.__name__] = end_of(name, redirect, place)
         shutil.rmtree(place)
-    usual = ends["heard"]
-    assert ends == dict.fromkeys(ends, usual)
-    assert usual[0] == 0 or name in ("render", "view")
+    assert ends == dict.fromkeys(ends, ends["heard"])
+    assert ends["heard"][0] == 0 or name in ("render", "view")
 
 
 def test_these_are_all_commands():
@@ -123,7 +122,6 @@ def test_these_are_all_commands():
 def test_on_a_pipe_lines_say_that_work_goes_on(capsys):
     with progress_bar("searching", line_every=0.01, total=None):
         time.sleep(0.2)
-    said = capsys.readouterr().err.splitlines()
-    assert said[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
+    assert capsys.readouterr().err.splitlines()[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
     time.sleep(0.05)
     assert not capsys.readouterr().err.splitlines()[1:]  # one may be on its way

@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 from packaging.version import Version
 
 import sphshell_pin
+from tests import test_packaging
 from tests.test_packaging import NAME, ROOT, load, script
 
-PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+PROJECT = test_packaging.PROJECT["project"]
 RECIPE = ROOT / "packaging" / "conda" / "recipe.yaml"
 # What a package on PyPI is called on conda-forge, where that differs.
 CONDA = {"pin": "pinocchio", "meshcat": "meshcat-python", "matplotlib": "matplotlib-base"}
@@ -64,25 +65,20 @@ def test_the_recipe_wants_what_pip_wants():
     needs = package["requirements"]
 
     def bounds(lines):
-        words = [
-            re.sub(r"\$\{\{ (\w+) \}\}", lambda m: context[m[1]], one).split() for one in lines
-        ]
-        return {word[0]: " ".join(word[1:]) for word in words}
+        filled = (re.sub(r"\$\{\{ (\w+) \}\}", lambda m: context[m[1]], one) for one in lines)
+        return {name: bound for name, _, bound in (one.partition(" ") for one in filled)}
 
     run = bounds(needs["run"])
     assert run.pop("python") == ""
     assert run == wanted(PROJECT["dependencies"])
     assert bounds(needs["run_constraints"]) == wanted(PROJECT["optional-dependencies"]["view"])
     host = bounds(one for one in needs["host"] if isinstance(one, str))
-    build = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["build-system"]
-    compiled = wanted(one.replace("[build]", "") for one in build["requires"])
-    assert compiled.items() <= host.items()
+    requires = test_packaging.PROJECT["build-system"]["requires"]
+    assert wanted(one.replace("[build]", "") for one in requires).items() <= host.items()
     (command,) = package["build"]["python"]["entry_points"]
     assert command == f"sphshell-pin = {PROJECT['scripts']['sphshell-pin']}"
-    assert (
-        f'match(python, "{PROJECT["requires-python"].replace(">=", "<")}")'
-        in (package["build"]["skip"])
-    )
+    older = PROJECT["requires-python"].replace(">=", "<")
+    assert f'match(python, "{older}")' in package["build"]["skip"]
 
 
 def test_newer_versions_of_pinocchio_reach_every_file(tmp_path, monkeypatch):

@@ -5,17 +5,15 @@ import os
 import re
 import subprocess
 import sys
-from functools import partial
 from html.parser import HTMLParser
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
-from threading import Thread
 from urllib.parse import unquote, urlsplit
 
 import pytest
 
 import sphshell_pin
 from sphshell_pin import errors
+from tests.programs import serving
 
 for package in ("mkdocs", "material", "mkdocstrings"):
     pytest.importorskip(package, reason="needs the extra docs: mkdocs-material, mkdocstrings")
@@ -39,8 +37,6 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         for key, value in attrs:
-            if value is None:
-                continue
             if (tag, key) in LOADED:
                 self.loaded.add(value)
             elif (tag, key) == ("a", "href"):
@@ -61,14 +57,11 @@ def built(tmp_path_factory, worker_id):
     with (shared / "site.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not said.exists():
+            command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", site]
+            # Examples without outputs, whatever notebooks there are.
+            env = {**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS": str(site / "none")}
             done = subprocess.run(
-                [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(site)],
-                cwd=ROOT,
-                # Examples without outputs, whatever notebooks there are.
-                env={**os.environ, "NO_MKDOCS_2_WARNING": "1", "NOTEBOOKS": str(site / "none")},
-                capture_output=True,
-                text=True,
-                check=False,
+                command, cwd=ROOT, env=env, capture_output=True, text=True, check=False
             )
             said.write_text(f"exit code {done.returncode}\n{done.stderr}", "utf-8")
     return site, said.read_text("utf-8")
@@ -112,22 +105,15 @@ def test_it_asks_nobody_for_anything(built, pages):
 def test_every_public_name_is_in_the_api(built, pages):
     site, _ = built
     anchors = set().union(*(pages[file].anchors for file in (site / "api").glob("*.html")))
-    for name in {*sphshell_pin.__all__, *sphshell_pin.results.__all__}:
-        home = getattr(getattr(sphshell_pin, name, None), "__module__", "sphshell_pin.results")
-        assert f"{home}.{name}" in anchors or any(
-            anchor.startswith("sphshell_pin.") and anchor.endswith(f".{name}") for anchor in anchors
-        ), f"sphshell_pin.{name} is on no page"
-    faults = [
-        name
-        for name, one in vars(errors).items()
-        if getattr(one, "__module__", "") == errors.__name__
-    ]
-    for name in faults:
-        if not name.startswith("_"):
-            assert f"sphshell_pin.errors.{name}" in anchors, name
+    known = {one for one in anchors if one.startswith("sphshell_pin.")}
+    names = {one.rpartition(".")[2] for one in known}
+    assert {*sphshell_pin.__all__, *sphshell_pin.results.__all__} <= names
+    own = {name for name, one in vars(errors).items() if isinstance(one, type)}
+    own = {name for name in own if getattr(errors, name).__module__ == errors.__name__}
+    assert {f"sphshell_pin.errors.{name}" for name in own if not name.startswith("_")} <= known
     # What a class inherits from one that has no page.
-    for name in ("model", "add_contact", "replace_pair", "dynamics_derivatives"):
-        assert f"sphshell_pin.dynamics.Scene.{name}" in anchors, name
+    inherited = ("model", "add_contact", "replace_pair", "dynamics_derivatives")
+    assert {f"sphshell_pin.dynamics.Scene.{name}" for name in inherited} <= known
 
 
 def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
@@ -137,14 +123,9 @@ def test_meanings_of_parameters_do_not_pass_for_types(built, pages):
 
 
 @pytest.fixture
-def address(built, monkeypatch):
-    site, _ = built
-    monkeypatch.setattr(SimpleHTTPRequestHandler, "log_message", lambda *_: None)
-    handler = partial(SimpleHTTPRequestHandler, directory=str(site))
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
+def address(built):
+    with serving(built[0]) as port:
+        yield f"http://127.0.0.1:{port}"
 
 
 @pytest.mark.browser
@@ -155,12 +136,8 @@ def test_it_fits_a_telephone_and_its_search_finds(built, browser, address, pages
     complaints: list[str] = []
     page.on("pageerror", lambda fault: complaints.append(str(fault)))
     page.on("response", lambda answer: answer.status < 400 or complaints.append(answer.url))
-    page.on(
-        "request",
-        lambda request: (
-            request.url.startswith((address, "data:")) or complaints.append(request.url)
-        ),
-    )
+    own = (address, "data:")
+    page.on("request", lambda one: one.url.startswith(own) or complaints.append(one.url))
     # Wide tables scroll in boxes of their own.
     inside = "[...document.querySelectorAll('.md-typeset table:not([class])')].every(t => "
     inside += "t.closest('.md-typeset__scrollwrap').getBoundingClientRect().right <= 390)"

@@ -1,13 +1,13 @@
 """What an object shows of itself: a line or two of text."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.base.summary import show_value
 from sphshell_pin.study.fit import Fit, Fitted
-from tests.models import ball
+from tests import models
+from tests.view import stand_ins
 
 RADIUS = 0.01
 
@@ -15,34 +15,16 @@ RADIUS = 0.01
 @pytest.fixture(scope="module")
 def shown() -> dict[str, object]:
     """One of each of the objects that a session leaves in a notebook's cell."""
-    sheet = sp.Shell(
-        [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]], name="<b>sheet</b>"
-    )
-    scene = sp.Scene(ball())
-    frame = scene.model.frames[scene.model.nframes - 1].name
-    law = sp.ImpactLaw(1e5, 1.5, 10.0, 1e-4)
-    pair = scene.add_contact(sp.Sphere(RADIUS, frame), sheet, law=law, name="ball-sheet")
+    sheet, law = stand_ins.plate(2.0, "<b>sheet</b>"), sp.ImpactLaw(1e5, 1.5, 10.0, 1e-4)
+    scene = sp.Scene(models.ball())
+    pair = scene.add_contact(sp.Sphere(RADIUS, "ball"), sheet, law=law, name="ball-sheet")
     simulation = sp.Simulation(scene, sp.RungeKutta4(1e-4))
-    start = pin.neutral(scene.model)
-    start[2] = RADIUS + 1e-4
-    result = simulation.run(
-        start, duration=0.02, record_dt=1e-3, sensitivities=["ball-sheet.law.stiffness"]
-    )
-    rollout = simulation.rollout([start] * 3, None, 0.01)
-    state = scene.state(start)
-    low = start.copy()
-    low[2] = RADIUS - 1e-4
-    fit = Fit(
-        scenario="drop.toml",
-        parameters=(Fitted("contact.0.law.k", "N/m", 1.0, 2.0, 1.5, 2.5, True),),
-        correlation=np.eye(1),
-        series=(),
-        remarks=("a < b",),
-        dof=3,
-        level=0.95,
-        runs=7,
-        converged=True,
-    )
+    start, low = (models.free_q([0, 0, RADIUS + gap]) for gap in (1e-4, -1e-4))
+    asked = ["ball-sheet.law.stiffness"]
+    result = simulation.run(start, duration=0.02, record_dt=1e-3, sensitivities=asked)
+    found = (Fitted("contact.0.law.k", "N/m", 1.0, 2.0, 1.5, 2.5, True),)
+    rest = {"dof": 3, "level": 0.95, "runs": 7, "converged": True}
+    fit = Fit("drop.toml", found, correlation=np.eye(1), series=(), remarks=("a < b",), **rest)
     return {
         "scene": scene,
         "pair": pair,
@@ -53,13 +35,13 @@ def shown() -> dict[str, object]:
         "scene_contacts": scene.contacts(low),
         "explanation": scene.explain(low),
         "simulation": simulation,
-        "state": state,
+        "state": scene.state(start),
         "result": result,
         "log": result.contacts,
         "energy": result.energy,
         "stats": result.stats,
         "sensitivities": result.sensitivities,
-        "rollout": rollout,
+        "rollout": simulation.rollout([start] * 3, None, 0.01),
         "dynamics": scene.dynamics_derivatives(low),
         "step": simulation.step_derivatives(low),
         "forces": scene.contact_force_derivatives(low),

@@ -87,15 +87,12 @@ def show(failure: Failure, path: Path, rows: list[str]) -> None:
 
 def print_table(report: Report, seconds: float) -> None:
     print(f"{'kind':12}{'files':>9}{'read':>9}{'refused':>9}{'broke':>9}")
-    total = Counter[str]()
-    for kind in KINDS:
-        own = {name: report.counts[kind, name] for name in ("read", "refused", "broke")}
-        if not any(own.values()):
-            continue
-        total.update(own)
-        print(f"{kind:12}{sum(own.values()):9}{''.join(f'{n:9}' for n in own.values())}")
-    files = sum(total.values())
-    print(f"{'all':12}{files:9}{''.join(f'{n:9}' for n in total.values())}")
+    rows = {k: [report.counts[k, name] for name in ("read", "refused", "broke")] for k in KINDS}
+    rows["all"] = [sum(each) for each in zip(*rows.values(), strict=True)]
+    files = sum(rows["all"])
+    for kind, row in rows.items():
+        if any(row):
+            print(f"{kind:12}{sum(row):9}{''.join(f'{n:9}' for n in row)}")
     print(
         f"{seconds:.0f} s, {files / seconds:.0f} files a second; slowest {report.slowest[0]:.2f} s "
         f"(input {report.slowest[1]}), largest process {report.peak / 2**20:.0f} MB; "

@@ -39,7 +39,6 @@ def corpus(suffix: str) -> tuple[bytes, ...]:
 
 def read(path: Path) -> None:
     """Read a file and use its surface."""
-    unit = "mm" if path.suffix == ".brep" else None
-    shell = sp.Shell.from_file(path, unit, time_limit=LIMIT)
+    shell = sp.Shell.from_file(path, "mm" if path.suffix == ".brep" else None, time_limit=LIMIT)
     shell.curvature_report()
     shell.contacts(shell.vertices[0], 0.1 * shell.size)

@@ -4,6 +4,7 @@ import functools
 import io
 import json
 import random
+import re
 import tempfile
 import zipfile
 from base64 import b64encode
@@ -46,9 +47,8 @@ def xacro_corpus() -> tuple[bytes, ...]:
     home = DATA / "xacro"
     parts = {"finger_description/package.xml", "finger_description/urdf/finger.xacro"}
     more = {name: (home / name).read_bytes() for name in sorted(parts | {"lengths.yaml"})}
-    return tuple(
-        tables.pack({"robot.xacro": p.read_bytes(), **more}) for p in sorted(home.glob("*.xacro"))
-    )
+    files = (path.read_bytes() for path in sorted(home.glob("*.xacro")))
+    return tuple(tables.pack({"robot.xacro": data, **more}) for data in files)
 
 
 @functools.cache
@@ -79,19 +79,16 @@ def mesh_corpus() -> tuple[bytes, ...]:
     buffer = np.array(solid.vertices, "<f4").tobytes() + np.array(solid.faces, "<u2").tobytes()
     uri = "data:application/octet-stream;base64," + b64encode(buffer).decode()
     accessor = {"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3"}
-    gltf = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
+    indices = {"bufferView": 1, "componentType": 5123, "count": 21, "type": "SCALAR"}
+    mesh = {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}
+    gltf = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
+    gltf |= {
         "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [
-            {**accessor, "min": [0, 0, 0], "max": [1, 1, 1]},
-            {"bufferView": 1, "componentType": 5123, "count": 21, "type": "SCALAR"},
-        ],
+        "meshes": [mesh],
+        "accessors": [{**accessor, "min": [0, 0, 0], "max": [1, 1, 1]}, indices],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 60},
-            {"buffer": 0, "byteOffset": 60, "byteLength": 42},
+            {"buffer": 0, "byteOffset": start, "byteLength": length}
+            for start, length in ((0, 60), (60, 42))
         ],
         "buffers": [{"uri": uri, "byteLength": 102}],
     }
@@ -114,32 +111,22 @@ _BY_ROBOTS = (".stl", ".obj", ".ply", ".off")
 
 @functools.cache
 def law_corpus() -> tuple[bytes, ...]:
-    law = 'type = "table", file = "law.csv"'
-    start, stop = (
-        tables.PRESS.index('type = "hertz"'),
-        tables.PRESS.index(' }\nfriction = { type = "bristle"'),
-    )
-    scenario = tables.PRESS[:start] + law + tables.PRESS[stop:]
-    return (
-        tables.pack({"law.toml": scenario.encode(), "law.csv": b"depth,force\n0,0\n1e-3,10\n"}),
-    )
-
-
-def fit_corpus() -> tuple[bytes, ...]:
-    return (MEASURED,)
+    law = r'type = "hertz".*?(?= \}\nfriction = \{ type = "bristle")'
+    scenario = re.sub(law, 'type = "table", file = "law.csv"', tables.PRESS, flags=re.S)
+    table = b"depth,force\n0,0\n1e-3,10\n"
+    return (tables.pack({"law.toml": scenario.encode(), "law.csv": table}),)
 
 
 @functools.cache
 def results_corpus() -> tuple[bytes, ...]:
     """Return the results of a run whose robots and surfaces came from files of all formats."""
     with tempfile.TemporaryDirectory() as folder:
-        home = Path(folder)
-        scenes.write(home)
-        scenario = home / "own.toml"
+        scenes.write(Path(folder))
+        scenario = Path(folder, "own.toml")
         scenario.write_text(scenes.SCENARIO)
         changes = {"run.record": '["patch", "torque"]', "run.record_dt": "4e-3"}
         result, _ = simulate(build(scenario, changes))
-        run = tables.reproducible(result.save(home / "run.npz"))
+        run = tables.reproducible(result.save(scenario.with_name("run.npz")))
         return (tables.pack({"run.npz": run}),)
 
 

@@ -66,15 +66,24 @@ def _folder(kind: str, corpus: Corpus, read: Reader, turns: int = 8) -> Kind:
     return Kind(f".{kind}.zip", corpus, folders.damaged_folder, readers.in_folder(read), turns)
 
 
+def _drawn(suffix: str) -> Kind:
+    corpus = functools.partial(strangers.mesh_corpus, suffix)
+    return Kind(f".drawn{suffix}", corpus, STRUCTURES[suffix], strangers.read_drawn(suffix), 4)
+
+
+def _cad(suffix: str) -> Kind:
+    return Kind(suffix, functools.partial(cad.corpus, suffix), damage, cad.read, 1)
+
+
 KINDS: dict[str, Kind] = {
     **{kind: _mesh(kind) for kind in WRITERS},
     # The reader with the most to check comes more often.
     "npz": _file(".npz", tables.npz_corpus, readers.read_result, 24),
-    "toml": _file(".toml", tables.toml_corpus, readers.read_scenario, 16),
+    "toml": _file(".toml", lambda: tables.SCENARIOS, readers.read_scenario, 16),
     "urdf": _file(".urdf", tables.urdf_corpus, readers.read_robot),
     "mjcf": _file(".xml", tables.mjcf_corpus, readers.read_robot),
-    "fit": _file(".csv", folders.fit_corpus, readers.read_measured),
-    "law": _folder("law", folders.law_corpus, readers.read_law),
+    "fit": _file(".csv", lambda: (folders.MEASURED,), readers.read_measured),
+    "law": _folder("law", folders.law_corpus, readers.read_scenario_in),
     "srdf": _folder("srdf", folders.srdf_corpus, readers.read_robot_in),
     "includes": _folder("includes", folders.include_corpus, readers.read_robot_in),
     "packages": _folder("packages", folders.package_corpus, readers.read_robot_in),
@@ -85,20 +94,8 @@ KINDS: dict[str, Kind] = {
     "expression": Kind(
         ".expression", strangers.expression_corpus, strangers.expression, strangers.read_expression
     ),
-    **{
-        f"drawn{suffix}": Kind(
-            f".drawn{suffix}",
-            functools.partial(strangers.mesh_corpus, suffix),
-            STRUCTURES[suffix],
-            strangers.read_drawn(suffix),
-            4,
-        )
-        for suffix in FORMATS
-    },
-    **{
-        suffix[1:]: Kind(suffix, functools.partial(cad.corpus, suffix), damage, cad.read, 1)
-        for suffix in cad.SUFFIXES
-    },
+    **{f"drawn{suffix}": _drawn(suffix) for suffix in FORMATS},
+    **{suffix[1:]: _cad(suffix) for suffix in cad.SUFFIXES},
     # A process for each takes a second.
     "xacro": _folder("xacro", folders.xacro_corpus, readers.read_robot_in, 1),
 }

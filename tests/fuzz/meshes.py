@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from tests import meshes
 from tests.fuzz.mutate import NUMBERS, alter, word
-
-Corner = tuple[float, float, float]
 
 
 @dataclass
@@ -25,36 +24,29 @@ class Mesh:
     """The counts of vertices and faces, and of corners of the first face, where they are wrong."""
 
 
-def _mesh(vertices: list[Corner], faces: list[list[int]]) -> Mesh:
-    return Mesh([[f"{x:.6g}" for x in one] for one in vertices], faces)
+def _mesh(vertices: Any, faces: Any) -> Mesh:
+    return Mesh([[f"{x:.6g}" for x in one] for one in vertices], [list(one) for one in faces])
 
 
 def _box() -> Mesh:
-    corners = [(float(x), float(y), float(z)) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
-    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return _mesh(corners, faces)
+    vertices, faces = meshes.cube(quads=True)
+    return _mesh(vertices + 0.5, faces.tolist())
 
 
-def _sheet(n: int = 5) -> Mesh:
-    rows = [(i / n, j / n, 0.1 * (i - n / 2) ** 2 / n) for i in range(n + 1) for j in range(n + 1)]
-    m = n + 1
-    faces = [
-        [i * m + j, (i + 1) * m + j, (i + 1) * m + j + 1, i * m + j + 1]
-        for i in range(n)
-        for j in range(n)
-    ]
-    return _mesh(rows, faces)
+def _sheet() -> Mesh:
+    vertices, faces = meshes.grid_plate(5, 5, quads=True)
+    bent = [(x + 0.5, y + 0.5, 0.1 * (5 * x) ** 2 / 5) for x, y, _ in vertices]
+    return _mesh(bent, faces.tolist())
 
 
-def _polygon(n: int = 12) -> Mesh:
-    star = [(k * (1.0 + k % 2), float(k * k % 7), 0.0) for k in range(n)]
-    return _mesh(star, [list(range(n)), [0, 1, 2]])
+def _polygon() -> Mesh:
+    star = [(k * (1.0 + k % 2), float(k * k % 7), 0.0) for k in range(12)]
+    return _mesh(star, [range(12), range(3)])
 
 
 def _tetrahedra() -> Mesh:
-    points = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 1.0, 1.0)]
     faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [1, 4, 2], [2, 4, 3], [1, 3, 4]]
-    return _mesh(points, faces)
+    return _mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)], faces)
 
 
 SHAPES = (_box, _sheet, _polygon, _tetrahedra)
@@ -103,13 +95,13 @@ def _index(corner: Any, first: int = 0) -> Any:
 
 
 def _reals(row: list[Any]) -> list[float]:
-    def real(value: Any) -> float:
+    out = []
+    for value in row:
         try:
-            return float(word(value))
+            out.append(float(word(value)))
         except ValueError:
-            return 0.0
-
-    return [real(one) for one in row]
+            out.append(0.0)
+    return out
 
 
 def _counts(mesh: Mesh) -> tuple[int, int]:
@@ -149,17 +141,14 @@ def write_obj(mesh: Mesh) -> bytes:
 
 
 def write_off(mesh: Mesh) -> bytes:
-    kind = "NOFF" if mesh.normals else "OFF"
-    rows = map(_text, _with_normals(mesh))
-    return "\n".join((kind, _text([*_counts(mesh), 0]), *rows, _counted(mesh, 0))).encode()
+    head = "NOFF" if mesh.normals else "OFF", _text([*_counts(mesh), 0])
+    return "\n".join((*head, *map(_text, _with_normals(mesh)), _counted(mesh, 0))).encode()
 
 
 def write_shl(mesh: Mesh) -> bytes:
-    vertices, faces = _counts(mesh)
-    rows = map(_text, mesh.vertices)
-    if not mesh.normals:
-        return "\n".join((f"{vertices} {faces} 0.001", *rows, _counted(mesh, 1))).encode()
-    head = ("Version: 2", f"{vertices} {faces} {len(mesh.normals)} 0.001")
+    counts, rows = list(_counts(mesh)), map(_text, mesh.vertices)
+    version = ["Version: 2"] if mesh.normals else []
+    head = *version, _text([*counts, *([len(mesh.normals)] if version else []), "0.001"])
     return "\n".join((*head, *rows, _counted(mesh, 1), *map(_text, mesh.normals))).encode()
 
 

@@ -4,8 +4,10 @@ import copy
 import random
 import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
+
+Way = Callable[[random.Random, bytes, Sequence[bytes]], bytes]
 
 LARGEST = 200_000  # [B] of a damaged file
 
@@ -19,21 +21,9 @@ VALUES: tuple[Any, ...] = (
     *(None, True, False, 0, -1, 1, 2, 3, 255, 2**31, 2**63, 10**30, 10**400, -(2**63) - 1),
     *(0.0, -0.0, 0.5, -1.5, 1e300, -1e300, 1e-320, 1e-30, 1e15, float("nan"), float("inf")),
     *("", "x", "name", "universe", "nan", "../..", "/", "file.py:f", "a\x00b", "\U0001f600"),
-    *(
-        "[bold]x[/]",
-        "<b>",
-        "%s{0}",
-        "line\nline",
-        "x" * 3000,
-        [],
-        [1],
-        [1, 2, 3],
-        [[]],
-        {},
-        {"x": 1},
-    ),
+    *("[bold]x[/]", "<b>", "%s{0}", "line\nline", "x" * 3000),
+    *([], [1], [1, 2, 3], [[]], {}, {"x": 1}),
 )
-_NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?")
 _INTEGERS = (0, 1, 2, 127, 128, 255, 256, 32767, 65535, 2**31 - 1, 2**31, 2**32 - 1)
 
 
@@ -63,11 +53,16 @@ def _overwrite(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
     return data[:start] + rng.randbytes(stop - start) + data[stop:]
 
 
-def _integer(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
-    form = rng.choice(("<B", "<H", "<I", ">I", "<Q"))
-    piece = struct.pack(form, rng.choice(_INTEGERS) % 2 ** (8 * struct.calcsize(form)))
+def _put(rng: random.Random, data: bytes, piece: bytes) -> bytes:
+    """Return `data` with `piece` over some of its bytes."""
     start = rng.randrange(max(1, len(data) - len(piece)))
     return data[:start] + piece + data[start + len(piece) :]
+
+
+def _integer(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
+    form = rng.choice(("<B", "<H", "<I", ">I", "<Q"))
+    largest = 2 ** (8 * struct.calcsize(form))
+    return _put(rng, data, struct.pack(form, rng.choice(_INTEGERS) % largest))
 
 
 def _real(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
@@ -75,16 +70,12 @@ def _real(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
     piece = struct.pack(rng.choice("<>") + "d", value)
     if abs(value) < 3e38 and rng.random() < 0.7:
         piece = struct.pack(rng.choice("<>") + "f", value)
-    start = rng.randrange(max(1, len(data) - len(piece)))
-    return data[:start] + piece + data[start + len(piece) :]
+    return _put(rng, data, piece)
 
 
 def _insert(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
-    at = rng.randrange(len(data) + 1)
-    piece = rng.choice(
-        (rng.randbytes(rng.randrange(1, 9)), b"\n", b" ", b"\0", b"\xff", b"#", b'"')
-    )
-    return data[:at] + piece + data[at:]
+    at, some = rng.randrange(len(data) + 1), rng.randbytes(rng.randrange(1, 9))
+    return data[:at] + rng.choice((some, b"\n", b" ", b"\0", b"\xff", b"#", b'"')) + data[at:]
 
 
 def _delete(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
@@ -94,8 +85,7 @@ def _delete(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
 
 def _repeat(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
     start, stop = _place(rng, data)
-    times = rng.choice((1, 1, 2, 10, 1000))
-    return data[:start] + data[start:stop] * times + data[start:]
+    return data[:start] + data[start:stop] * rng.choice((1, 1, 2, 10, 1000)) + data[start:]
 
 
 def _truncate(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
@@ -107,36 +97,36 @@ def _splice(rng: random.Random, data: bytes, others: Sequence[bytes]) -> bytes:
     return data[: rng.randrange(len(data) + 1)] + other[rng.randrange(len(other) + 1) :]
 
 
-def _number(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
-    found = list(_NUMBER.finditer(data))
-    if not found:
-        return data
-    one = rng.choice(found)
-    return data[: one.start()] + rng.choice(NUMBERS).encode() + data[one.end() :]
+def _other(pattern: bytes, draw: Callable[[random.Random], bytes]) -> Way:
+    """Return what puts another text in the place of one that matches `pattern`."""
+
+    def change(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
+        found = list(re.finditer(pattern, data))
+        if not found:
+            return data
+        one = rng.choice(found)
+        return data[: one.start()] + draw(rng) + data[one.end() :]
+
+    return change
 
 
-def _digit(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
-    places = [i for i, byte in enumerate(data) if 48 <= byte <= 57]
-    if not places:
-        return data
-    at = rng.choice(places)
-    return data[:at] + b"%d" % rng.randrange(10) + data[at + 1 :]
+_number = _other(
+    rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?", lambda rng: rng.choice(NUMBERS).encode()
+)
+_digit = _other(rb"\d", lambda rng: b"%d" % rng.randrange(10))
 
 
 def _lines(rng: random.Random, data: bytes, _: Sequence[bytes]) -> bytes:
     lines = data.splitlines(keepends=True)
     if not lines:
         return data
-    at, to = rng.randrange(len(lines)), rng.randrange(len(lines))
-    way = rng.randrange(4)
-    if way == 0:
-        del lines[at]
-    elif way == 1:
+    at, to, way = rng.randrange(len(lines)), rng.randrange(len(lines)), rng.randrange(4)
+    if way == 1:
         lines.insert(to, lines[at])
     elif way == 2:
         lines[at], lines[to] = lines[to], lines[at]
     else:
-        lines[at] = lines[at].rstrip(b"\r\n")
+        lines[at] = lines[at].rstrip(b"\r\n") if way == 3 else b""
     return b"".join(lines)
 
 
@@ -200,8 +190,7 @@ def _places(tree: Any) -> Any:
     waiting = [tree]
     while waiting:
         node = waiting.pop()
-        items = node.items() if isinstance(node, dict) else enumerate(node)
-        for key, value in list(items):
+        for key, value in list(node.items() if isinstance(node, dict) else enumerate(node)):
             yield node, key
             if isinstance(value, dict | list):
                 waiting.append(value)
@@ -218,9 +207,8 @@ def _change(rng, node, key, places, values):
         elif way == 2 and isinstance(node, dict):
             node[rng.choice((f"{key}x", str(other_key), "", "\u00e9", "a.b"))] = node.pop(key)
         elif way == 3 and isinstance(node[key], list):
-            node[key] = node[key] * rng.choice((0, 2, 3)) + [
-                odd_value(rng, values)
-            ] * rng.randrange(2)
+            node[key] = node[key] * rng.choice((0, 2, 3))
+            node[key] += [odd_value(rng, values)] * rng.randrange(2)
         elif way == 4 and isinstance(node[key], int | float):
             node[key] *= rng.choice((-1, 0, 10, 1e-3, 1e3, 1e9, 1e-9, 1e100))
         else:

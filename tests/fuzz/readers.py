@@ -55,6 +55,10 @@ def read_scenario(path: Path) -> None:
     built.scene.contacts(built.q0, built.v0)
 
 
+def read_scenario_in(home: Path) -> None:
+    read_scenario(home / "law.toml")
+
+
 def read_robot(path: Path) -> None:
     # Without its meshes the robot may be read where it is refused with them.
     with contextlib.suppress(SphshellError):
@@ -87,11 +91,6 @@ def read_robot_in(home: Path) -> None:
     srdf = home / "robot.srdf"
     more = {"srdf": srdf, "pose": "closed"} if srdf.exists() else {}
     _use(robots.load_file(next(home.glob("robot.[!s]*"), home / "robot.urdf"), [home], **more))
-
-
-def read_law(home: Path) -> None:
-    """Read a scenario with the table of a law."""
-    read_scenario(home / "law.toml")
 
 
 def read_measured(path: Path) -> None:

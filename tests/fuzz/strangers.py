@@ -1,7 +1,6 @@
 """Expressions of xacro files from a grammar, and meshes that results hold."""
 
 import contextlib
-import functools
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -42,18 +41,20 @@ def expression(rng: random.Random, _: bytes = b"") -> bytes:
     return texts[-1][:20_000].encode()
 
 
-@functools.cache
 def expression_corpus() -> tuple[bytes, ...]:
     """Return expressions that compute."""
-    return tuple(
-        text.encode()
-        for text in (
-            "pi / 2 + radians(90)",
-            "[x * k for x in [1, 2] if x > 1][0]",
-            "', '.join(sorted(d.keys())) + str(max([1, 2]))",
-            "'a %5.2f' % d['a'] if k else d.a",
-        )
+    return (
+        b"pi / 2 + radians(90)",
+        b"[x * k for x in [1, 2] if x > 1][0]",
+        b"', '.join(sorted(d.keys())) + str(max([1, 2]))",
+        b"'a %5.2f' % d['a'] if k else d.a",
     )
+
+
+_FAULTS = (
+    *(ArithmeticError, LookupError, NameError, TypeError, ValueError, MemoryError),
+    *(SyntaxError, AttributeError),
+)
 
 
 def read_expression(path: Path) -> None:
@@ -69,16 +70,11 @@ def read_expression(path: Path) -> None:
     text = path.read_text(errors="replace")
     listed = [*space._global_symbols.values()]
     listed += [v for s in ("python", "math", "xacro") for v in space._global_symbols[s].values()]
-    for evaluate in (
-        lambda: space.safe_eval(text, table),
-        lambda: other.eval(text, {}, other_names),
-    ):
+    for evaluate, names in ((space.safe_eval, (table,)), (other.eval, ({}, other_names))):
         try:
-            value = evaluate()
-        except (ArithmeticError, LookupError, NameError, TypeError, ValueError, MemoryError) as one:
+            value = evaluate(text, *names)
+        except (*_FAULTS, xacro.XacroException) as one:
             fault: Exception = one
-        except (SyntaxError, AttributeError, xacro.XacroException) as one:
-            fault = one
         else:
             data = type(value).__module__ in ("builtins", "xacro") and not isinstance(value, type)
             given = any(value is one for one in [*listed, *other_names.values()])

@@ -45,11 +45,9 @@ _INCLUDED = re.compile(r"<xacro:include\s+filename=[\"'](?:[^\"']*/)?([^/\"']+)[
 _FOUND = re.compile(r"<xacro:include\s+filename=[\"']\$\(find (\w+)\)/([^\"']+)[\"']")
 _ADVICE: dict[str, dict[str, Any]] = {
     "--density 2700": {"density": 2700.0},
-    "--no-mimic": {"mimic": False},
-    "mimic = false": {"mimic": False},
+    **{said: {"mimic": False} for said in ("--no-mimic", "mimic = false")},
     "--free-flyer": {"free_flyer": True},
 }
-"""What a refusal says to do, and how."""
 _VALUES = {
     "dof": "7",
     "ur_type": "ur5e",
@@ -64,11 +62,11 @@ _VALUES = {
 """Of arguments that a file does not run without, as its repository's launch files have them.
 
 Names of packages in braces stand for their folders."""
+_NOT_THERE = "it includes a file that is not there, or not for these arguments"
 _KINDS = (
     ("mesh cannot be loaded", "a collision mesh is not in the repository"),
     ("there is no package", "a package is in none of the repositories"),
-    ("No such file", "it includes a file that is not there, or not for these arguments"),
-    ("Is a directory", "it includes a file that is not there, or not for these arguments"),
+    *((said, _NOT_THERE) for said in ("No such file", "Is a directory")),
     ("Invalid parameter", "it gives a macro a parameter that the macro does not have"),
     ("Undefined parameters", "it leaves out a parameter of a macro"),
     ("unknown macro name", "it calls a macro that no file of it defines"),
@@ -106,9 +104,8 @@ def robot_files(folder: Path) -> Iterator[Path]:
     parts = {(one.parent, name) for one in texts for name in _INCLUDED.findall(texts[one])}
     ends = tuple({"/".join(("", *one)) for text in texts.values() for one in _FOUND.findall(text)})
     for file in files:
-        if str(file).endswith(ends):
-            continue
-        if (file.parent, file.name) in parts or re.search(r"\.(srdf|gazebo)\b", file.name):
+        included = str(file).endswith(ends) or (file.parent, file.name) in parts
+        if included or re.search(r"\.(srdf|gazebo)\b", file.name):
             continue
         try:
             root = ET.parse(file).getroot()
@@ -129,16 +126,11 @@ def _makes_links(element: ET.Element) -> bool:
 
 def ask(file: Path, part: Path | None, row: Row) -> Row:
     """Load, check and draft, each until a refusal names no option that was not tried."""
+    unit = None if part is None or part.suffix.lower() in (".step", ".iges") else "mm"
 
     def load(row: Row) -> str:
         robots.load_file(file, **{"mimic": True, **row.options})
         return ""
-
-    def value(name: str) -> str | None:
-        given = _VALUES.get(name)
-        package = re.match(r"\{(\w+)\}", given or "")
-        place = Folders.of(file).package(package[1]) if package else None
-        return given if package is None or given is None else given.replace(package[0], str(place))
 
     def check(row: Row) -> str:
         report = check_robot(file, sizes=QUICK, **row.options)
@@ -147,29 +139,23 @@ def ask(file: Path, part: Path | None, row: Row) -> Row:
     def new(row: Row) -> str:
         options = dict(row.options)
         base = "floating" if options.pop("free_flyer", False) else None
-        unit = None if part is None or part.suffix.lower() in (".step", ".iges") else "mm"
         with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "made.toml"
+            out = Path(folder, "made.toml")
             new_scenario(file, str(part), unit=unit, base=base, out=out, **options)
         return ""
 
     warnings.simplefilter("ignore")
-    row = _advised(row, "load", load, value)
+    row = _advised(file, row, "load", load)
     if not row.load:
-        row = _advised(row, "check", check, value)
+        row = _advised(file, row, "check", check)
         began = time.process_time()
-        row = row if part is None else _advised(row, "new", new, value)
+        row = row if part is None else _advised(file, row, "new", new)
         row.seconds = time.process_time() - began
     return row
 
 
-def _advised(
-    row: Row, step: str, way: Callable[[Row], str], value: Callable[[str], str | None]
-) -> Row:
-    """Return `row` with the reason of a step's refusal, after what refusals say to add.
-
-    `value(name)` is that of an argument of a xacro file, where it is known.
-    """
+def _advised(file: Path, row: Row, step: str, way: Callable[[Row], str]) -> Row:
+    """Return `row` with the reason of a step's refusal, after what refusals say to add."""
     while True:
         try:
             reason = way(row)
@@ -180,8 +166,7 @@ def _advised(
         setattr(row, step, reason)
         more = {k: v for word, one in _ADVICE.items() if word in reason for k, v in one.items()}
         listed = reason.partition("sets:")[2]
-        asked = [name for name in _VALUES if f" {name}" in listed]
-        given = {name: value(name) for name in asked}
+        given = {name: _value(name, file) for name in _VALUES if f" {name}" in listed}
         if given:
             more["xacro_args"] = row.options.get("xacro_args", {}) | given
         if not more or row.options.items() >= more.items():
@@ -189,16 +174,22 @@ def _advised(
         row = replace(row, options=row.options | more)
 
 
-def _child(pipe: Connection, file: Path, part: Path | None, row: Row) -> None:
-    resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
-    pipe.send(ask(file, part, row))
+def _value(name: str, file: Path) -> str:
+    """Return the value of an argument of a xacro file, with the folders of packages."""
+    place = Folders.of(file).package
+    return re.sub(r"\{(\w+)\}", lambda found: str(place(found[1])), _VALUES[name])
 
 
 def _asked(file: Path, part: Path | None, row: Row) -> Row:
     """Ask in a process of its own."""
+
+    def answer(pipe: Connection) -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (LIMIT, LIMIT + 5))
+        pipe.send(ask(file, part, row))
+
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_child, args=(there, file, part, row))
+    child = context.Process(target=answer, args=(there,))
     child.start()
     there.close()
     try:
@@ -249,17 +240,15 @@ def tables(rows: Sequence[Row]) -> list[Measured]:
     drafts = [row for row in rows if row.new is not None]
     count = Counter(row.came_to for row in rows)
     loaded, times = len(rows) - count["not loaded"], [row.seconds for row in drafts]
-    text = (
-        f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
-        f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(row.options) for row in rows)} "
-        "with options that refusals named."
+    text = f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
+    text += (
+        f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(one.options) for one in rows)} "
     )
+    text += "with options that refusals named."
     if drafts:
-        text += (
-            f" Of {len(drafts)} scenarios that `new` was asked for it wrote "
-            f"{sum(not row.new for row in drafts)}; seconds of the processor: median "
-            f"{np.median(times):.1f}, most {max(times):.1f}."
-        )
+        text += f" Of {len(drafts)} scenarios that `new` was asked for it wrote "
+        text += f"{sum(not row.new for row in drafts)}; seconds of the processor: median "
+        text += f"{np.median(times):.1f}, most {max(times):.1f}."
     table = [["repository", "files", "load", "pass check-robot"]]
     for name in dict.fromkeys(row.repository for row in rows):
         of = Counter(row.came_to for row in rows if row.repository == name)
@@ -267,10 +256,8 @@ def tables(rows: Sequence[Row]) -> list[Measured]:
     fell = Counter((row.came_to, _kind(row.load or row.check or "")) for row in rows)
     fell.update(("no scenario", _kind(row.new)) for row in drafts if row.new)
     reasons = [[*what, str(number)] for what, number in fell.most_common() if what[0] != "right"]
-    return [
-        Measured(text=text, table=table),
-        Measured("Failures", table=[["outcome", "reason", "files"], *reasons]),
-    ]
+    failures = [["outcome", "reason", "files"], *reasons]
+    return [Measured(text=text, table=table), Measured("Failures", table=failures)]
 
 
 def _kind(reason: str) -> str:

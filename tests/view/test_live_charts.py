@@ -31,8 +31,7 @@ def test_the_peak_of_each_piece_of_time_is_kept():
     for piece in np.split(np.arange(5000), cuts):  # as frames bring them, some of them empty
         points += thinner.add(t[piece], values[piece], 0.01)
     points += thinner.end()
-    pieces = np.floor(t / 0.01)
-    expected = []
+    pieces, expected = np.floor(t / 0.01), []
     for k in np.unique(pieces):
         inside = values[pieces == k]
         largest = inside[np.abs(inside).argmax(axis=0), [0, 1]]
@@ -71,8 +70,7 @@ def test_only_the_curves_that_are_asked_for_are_computed():
     def read(key):
         return lambda block: computed.append(key) or block[:, 0]
 
-    series = [Series(k, "Position", k, "deg", "q", read(k)) for k in "abc"]
-    charts = charts_of(series=series)
+    charts = charts_of(series=[Series(k, "Position", k, "deg", "q", read(k)) for k in "abc"])
     rows = rows_of([0.0, 0.01, 0.02], [1, 2, 3], q=[[4], [5], [6]])
     assert charts.add(rows, 0.01) == [[0.0], [0.01]]
     assert computed == []
@@ -92,16 +90,13 @@ def test_only_the_curves_that_are_asked_for_are_computed():
 
 def test_forces_are_summed_and_listed_by_pair():
     charts = charts_of()
-    assert [(one["key"], one["unit"]) for one in charts.descriptions()] == [
-        ("normal", "N"),
-        ("friction", "N"),
-        ("normal.left", "N"),
-        ("friction.left", "N"),
-        ("normal.right", "N"),
-        ("friction.right", "N"),
-        ("depth.left", "mm"),
-        ("depth.right", "mm"),
+    forces = [
+        "normal",
+        "friction",
+        *(f"{n}.{k}" for k in ("left", "right") for n in ("normal", "friction")),
     ]
+    units = dict.fromkeys(forces, "N") | dict.fromkeys(("depth.left", "depth.right"), "mm")
+    assert {one["key"]: one["unit"] for one in charts.descriptions()} == units
     charts.ask("tab", ["depth.right", "friction.left", "normal"])
     assert charts.keys == ("normal", "friction.left", "depth.right")
     charts.add(rows_of([0.0, 1.0], [[1, 2], [3, 4]]), 1.0)

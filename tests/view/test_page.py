@@ -15,8 +15,7 @@ from tests.view.test_meshes import ball, stl
 
 def unpacked(page):
     """The commands of a page, as the browser reads them."""
-    scene = re.search(r'id="scene">([^<]*)<', page).group(1)
-    data = gzip.decompress(base64.b64decode(scene))
+    data = gzip.decompress(base64.b64decode(re.search(r'id="scene">([^<]*)<', page).group(1)))
     commands, at = [], 0
     while at < len(data):
         (length,) = struct.unpack_from("<I", data, at)
@@ -25,24 +24,21 @@ def unpacked(page):
     return commands
 
 
+NO_CLIP = {"animations": [{"clip": {"tracks": []}}]}
+
+
 def filmed(matrices, times):
     """Tracks by name, and the still transform, of one node with these poses."""
     window = FilmWindow()
     node = meshcat.Visualizer(window=window)["node"]
     for window.frame, matrix in enumerate(matrices):
         node.set_transform(matrix)
-    commands = window.commands(np.asarray(times, dtype=float))
-    tracks = {}
-    for command in commands:
-        if command["type"] == "set_animation":
-            for track in command["animations"][0]["clip"]["tracks"]:
-                width = 4 if track["type"] == "quaternion" else 3
-                tracks[track["name"]] = (
-                    np.frombuffer(track["times"].data, dtype="<f4"),
-                    np.frombuffer(track["values"].data, dtype="<f4").reshape(-1, width),
-                )
-    still = next(c["matrix"] for c in commands if c["type"] == "set_transform")
-    return tracks, np.reshape(still, (4, 4)).T
+    told = {one["type"]: one for one in window.commands(np.asarray(times, dtype=float))}
+    tracks, (clip,) = {}, told.get("set_animation", NO_CLIP)["animations"]
+    for track in clip["clip"]["tracks"]:
+        t, values = (np.frombuffer(track[name].data, "<f4") for name in ("times", "values"))
+        tracks[track["name"]] = t, values.reshape(len(t), -1)
+    return tracks, np.reshape(told["set_transform"]["matrix"], (4, 4)).T
 
 
 def test_tracks_compose_to_the_poses_that_were_filmed():
@@ -58,11 +54,8 @@ def test_tracks_compose_to_the_poses_that_were_filmed():
     for name in (".position", ".quaternion", ".scale"):
         np.testing.assert_allclose(tracks[name][0], times, rtol=1e-6)
     for k, matrix in enumerate(matrices):
-        composed = pose(
-            pin.Quaternion(tracks[".quaternion"][1][k].astype(float)).matrix(),
-            tracks[".position"][1][k],
-            tracks[".scale"][1][k],
-        )
+        rotation = pin.Quaternion(tracks[".quaternion"][1][k].astype(float)).matrix()
+        composed = pose(rotation, tracks[".position"][1][k], tracks[".scale"][1][k])
         np.testing.assert_allclose(composed, matrix, atol=2e-6)
 
 
@@ -73,8 +66,7 @@ def test_quaternions_take_the_short_way():
 
 
 def test_what_stands_still_costs_no_track_and_a_pause_no_keys():
-    still = [pose(np.eye(3), np.ones(3))] * 50
-    assert filmed(still, np.arange(50))[0] == {}
+    assert filmed([pose(np.eye(3), np.ones(3))] * 50, np.arange(50))[0] == {}
     moved = [pose(np.eye(3), np.array([float(k >= 20), 0, 0])) for k in range(50)]
     tracks = filmed(moved, np.arange(50))[0]
     assert list(tracks) == [".position"]
@@ -133,5 +125,4 @@ def test_a_page_needs_nothing_from_anywhere_and_escapes_what_it_is_told():
     assert "three.js authors" in notices
     assert notices.count("Permission is hereby granted") >= 4
     # The same scene gives the same page, byte by byte.
-    again = render_page(commands, title, [("#ff0000", "5 < 6")])
-    assert page == again
+    assert page == render_page(commands, title, [("#ff0000", "5 < 6")])

@@ -11,12 +11,8 @@ from tests.view.stand_ins import contact_log
 
 def some_patches(*rows):
     patches = np.zeros(len(rows), PATCH)
-    for patch, (a, b, pressure) in zip(patches, rows, strict=True):
-        patch["half_axes"], patch["axis_world"], patch["peak_pressure"] = (
-            (a, b),
-            (0, 1, 0),
-            pressure,
-        )
+    *axes, patches["peak_pressure"] = np.transpose(rows)
+    patches["half_axes"], patches["axis_world"] = np.transpose(axes), (0, 1, 0)
     return patches
 
 
@@ -48,8 +44,7 @@ def test_a_patch_is_where_the_contact_is(pool):
 
 
 def test_colors_follow_the_pressure(pool):
-    patches = some_patches((1e-3, 1e-3, 1e5), (1e-3, 1e-3, 9e6))
-    poses = pool([{}, {}], patches, PatchScale(4e6))
+    poses = pool([{}, {}], some_patches((1e-3, 1e-3, 1e5), (1e-3, 1e-3, 9e6)), PatchScale(4e6))
     assert set(poses) == {(0, 0), (1, LEVELS - 1)}
 
 
