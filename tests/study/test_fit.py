@@ -214,6 +214,8 @@ def test_experiments_of_their_own_settings_are_fitted_together(bounce):
     start = {exponent: 1.3, STIFFNESS: 5e4}
     found = sp.fit(bounce, experiments, [STIFFNESS, exponent], changes=start)
     assert found[exponent].value == pytest.approx(1.5, abs=0.02)
+    unit = found[STIFFNESS].unit.removeprefix("N/m^")
+    assert float(unit) == pytest.approx(found[exponent].value, abs=1e-3)  # not the start's
     assert {one.experiment for one in found.series} == {"0.4 m/s", "1.0 m/s"}
     assert any("are correlated" in one for one in found.remarks)
 

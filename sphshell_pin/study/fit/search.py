@@ -20,6 +20,8 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 from sphshell_pin.scenario.format.build import Built, rebuild
+from sphshell_pin.scenario.format.reading import change_scenario, look_up
+from sphshell_pin.scenario.format.sliders import meaning
 from sphshell_pin.study.fit.data import Series
 from sphshell_pin.study.fit.parameters import TIE, Free
 from sphshell_pin.study.fit.report import Fit, Fitted, patterned, remarks_on
@@ -194,7 +196,12 @@ class Search:
             correlation = covariance / np.outer(deviations, deviations)
         correlation[~np.isfinite(deviations)] = correlation[:, ~np.isfinite(deviations)] = np.nan
         np.fill_diagonal(correlation, 1.0)
-        columns = self.free, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
+        # The unit of a stiffness follows from the exponent that was found.
+        built = self.trials[0].built
+        changed = change_scenario(built.scenario, self._changes(self.x), built.path)
+        found = [look_up(changed, one.keys[0], built.path) for one in self.free]
+        units = [meaning(changed, one).unit for one in found]
+        columns = self.free, units, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
         fitted = tuple(_fitted(*one) for one in zip(*columns, strict=True))
         series = self._compared()
         remarks = remarks_on(fitted, correlation, blind, series, dof)
@@ -215,11 +222,12 @@ class Search:
                 self._known[key] = np.full(len(self.measured), np.nan)
         return self._known[key]
 
+    def _changes(self, x: Array) -> dict[str, str]:
+        pairs = zip(self.free, x.tolist(), strict=True)
+        return {key: one.text(value) for one, value in pairs for key in one.keys}
+
     def _run(self, x: Array) -> Array:
-        texts = [one.text(value) for one, value in zip(self.free, x.tolist(), strict=True)]
-        pairs = zip(self.free, texts, strict=True)
-        changes = {key: text for one, text in pairs for key in one.keys}
-        parts = []
+        changes, parts = self._changes(x), []
         for trial in self.trials:
             parts.append(trial.predict(changes))
             self._told(0, self._misfit)
@@ -329,7 +337,7 @@ def _quiet(sensor: Sensor) -> Sensor:
     return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
 
 
-def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
+def _fitted(one: Free, unit: str, x: float, beyond: float, half: float) -> Fitted:
     """Return a parameter with its interval, `half` to both sides of x + `beyond`; nan if held.
 
     It is not determined if that interval leaves its order of magnitude open: if it reaches from one
@@ -338,10 +346,10 @@ def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
     name, value = TIE.join(one.keys), float(one.text(x))
     if not math.isfinite(half):
         held = math.isnan(half)
-        return Fitted(name, one.unit, one.start, value, -half, half, held, held)
+        return Fitted(name, unit, one.start, value, -half, half, held, held)
     low, high = one.to_value(x + beyond - half), one.to_value(x + beyond + half)
     # One that must be positive is searched by its logarithm: its relative deviation is that of x.
     from_zero = half < 1.0 if one.log else one.low != 0.0 or low > 0.0
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
-    return Fitted(name, one.unit, one.start, value, low, high, determined)
+    return Fitted(name, unit, one.start, value, low, high, determined)
