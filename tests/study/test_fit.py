@@ -13,6 +13,8 @@ import sphshell_pin as sp
 from sphshell_pin.errors import DataError, InvalidParameter, ScenarioError
 from sphshell_pin.scenario import build, read_scenario
 from sphshell_pin.scenario.format.reading import find_scenario
+from sphshell_pin.study.fit.data import Series
+from sphshell_pin.study.fit.report import patterned
 from sphshell_pin.study.fit.search import covariance_of
 from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
@@ -118,6 +120,21 @@ def test_pulses_are_not_laid_on_others():
     """The nearest minimum of this set is off by a half: a bounce lies on another of the data."""
     ((values, *_),) = many_sets(1, first=5, workers=1)
     np.testing.assert_allclose(values, list(TRUTH.values()), rtol=0.01)
+
+
+def test_noise_has_a_pattern_in_one_of_a_hundred_fits():
+    """Whatever its size in time, and in several columns."""
+    rng, t = np.random.default_rng(0), np.linspace(0.0, 1.0, 200)
+    sizes = 0.1 + np.exp(-((t - 0.5) ** 2) / 0.01)
+
+    def column(memory):
+        noise = sizes * rng.normal(size=200)
+        noise[1:] += memory * noise[:-1]
+        return Series("", "", "N", t, noise, np.zeros(200), np.ones(200), given=False)
+
+    found = sum(bool(patterned([column(0.0), column(0.0)])) for _ in range(1000))
+    assert found <= stats.binom.ppf(0.999, 1000, 0.01)
+    assert len(patterned([column(0.0), column(0.7)])) == 1
 
 
 def test_what_a_fit_does_not_explain_is_said(bounce):

@@ -72,7 +72,7 @@ class Fit(Summarized):
         those that the data do not determine
     series : each measured column of each experiment, with residuals
     remarks : sentences on what the data do not determine, on what is strongly correlated, on values
-        at a bound, on residuals that are not as large as given deviations
+        at a bound, on residuals that are more than noise or not as large as given deviations
     dof : measured values less parameters
     level : probability of the intervals
     runs : how many runs were made
