@@ -4,7 +4,7 @@ import csv
 import math
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -68,6 +68,12 @@ class Series:
     def rms(self) -> float:
         """Root of the mean square of the residuals, in `unit`."""
         return float(np.sqrt(np.mean(self.residuals**2)))
+
+    def until(self, end: float) -> "Series":
+        """Return the values at the times up to `end` [s]."""
+        columns = (self.t, self.measured, self.fitted, self.sigma)
+        t, measured, fitted, sigma = (one[self.t <= end] for one in columns)
+        return replace(self, t=t, measured=measured, fitted=fitted, sigma=sigma)
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 FALSE_ALARM = 0.01
 # A pair of which one explains so much of the variance of the other is told.
 SHARED = 0.9
+# Residuals of so small a part of a column's range are told no more: rows are interpolated.
+_SMALL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class Fit(Summarized):
         those that the data do not determine
     series : each measured column of each experiment, with residuals
     remarks : sentences on what the data do not determine, on what is strongly correlated, on values
-        at a bound, on residuals that are not as large as given deviations
+        at a bound, on residuals that are more than noise or not as large as given deviations
     dof : measured values less parameters
     level : probability of the intervals
     runs : how many runs were made
@@ -168,6 +170,22 @@ class Fit(Summarized):
         return "\n".join([*lines, *self.remarks])
 
 
+def patterned(series: Sequence[Series]) -> list[Series]:
+    """Return the columns whose residuals are more than noise: neighbours are alike.
+
+    Products of neighbours have the mean 0 in independent noise, also where its size changes: their
+    sum over the root of the sum of their squares is then nearly normal (White, Econometrica 48
+    (1980) 817). In noise there is such a column in FALSE_ALARM of the fits.
+    """
+    limit, out = float(stats.norm.isf(FALSE_ALARM / len(series))), []
+    for one in series:
+        weighted, small = one.residuals / one.sigma, _SMALL * float(np.ptp(one.measured))
+        products = weighted[1:] * weighted[:-1]
+        if one.rms > small and products.sum() > limit * np.linalg.norm(products):
+            out.append(one)
+    return out
+
+
 def remarks_on(
     fitted: Sequence[Fitted],
     correlation: Array,
@@ -194,6 +212,13 @@ def remarks_on(
         for i in np.flatnonzero(correlation[k, :k] ** 2 > SHARED).tolist():
             pair = f"{fitted[i].key} and {one.key}"
             out.append(f"{pair} are correlated, {correlation[k, i]:+.3f}")
+    for column in patterned(series):
+        rms = f"{column.rms:.3g} {column.unit}".rstrip()
+        out.append(
+            f"the fit does not explain {column.name} of {column.experiment}: its residuals, {rms}, "
+            "follow a pattern, so intervals are too narrow. The scenario leaves something out, the "
+            "noise is correlated, or the search ended in the wrong place: start elsewhere"
+        )
     if all(one.given for one in series):
         squares = sum(float(np.sum((one.residuals / one.sigma) ** 2)) for one in series)
         low, high = stats.chi2.ppf([0.5 * FALSE_ALARM, 1 - 0.5 * FALSE_ALARM], dof)

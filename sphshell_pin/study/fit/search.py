@@ -20,9 +20,11 @@ from sphshell_pin.errors import (
     WeakLawWarning,
 )
 from sphshell_pin.scenario.format.build import Built, rebuild
+from sphshell_pin.scenario.format.reading import change_scenario, look_up
+from sphshell_pin.scenario.format.sliders import meaning
 from sphshell_pin.study.fit.data import Series
 from sphshell_pin.study.fit.parameters import TIE, Free
-from sphshell_pin.study.fit.report import Fit, Fitted, remarks_on
+from sphshell_pin.study.fit.report import Fit, Fitted, patterned, remarks_on
 from sphshell_pin.study.quantities import quantities_of, row_step
 
 Progress = Callable[[int, float], object]
@@ -33,6 +35,8 @@ _FIXED_STEP_TOLERANCE, _LEAST_TOLERANCE = 1e-9, 1e-12
 _MOST_ROUNDS, _SAME_SIGMA = 6, 0.02
 # How far the first step may go in x.
 _FIRST_STEP = 0.5
+# Parts of the data that are fitted one after the other, and how far each may move x.
+_SHARES, _REACH = (1 / 16, 1 / 8, 1 / 4, 1 / 2), 1.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,12 @@ class Trial:
                 record_dt=row_step(t) or None,
             )
         return quantities_of(result, built.scene, t, wanted)
+
+    def until(self, share: float) -> "Trial":
+        """Return the experiment with the first `share` of its times."""
+        t = np.unique(np.concatenate([one.t for one in self.data]))
+        end = t[: int(share * len(t))].max(initial=-1.0)
+        return replace(self, data=[one.until(end) for one in self.data if one.t[0] <= end])
 
     def predict(self, changes: Mapping[str, str]) -> Array:
         """Return what a run with `changes` says of all data (N,)."""
@@ -107,12 +117,55 @@ class Search:
         except SphshellError as fault:
             fault.add_note("this is the run at the start values")
             raise
+        self._settle()
+        if patterned(self._compared()):
+            # It may be where one pulse of the run lies on another one of the data. Both ends are
+            # judged by their likelihood: weights of its own make every end look good.
+            ends = [(self._unlikely(), self.x, self.sigma, self.converged)]
+            self.x = self._grown()
+            if np.isfinite(self._values(self.x)).all():
+                self._settle()
+                ends += [(self._unlikely(), self.x, self.sigma, self.converged)]
+            _, self.x, self.sigma, self.converged = min(ends, key=lambda one: one[0])
+
+    def _settle(self) -> None:
+        """Search from where it is, until weights that are estimated from residuals stay."""
         for _ in range(_MOST_ROUNDS):
             self._minimize()
             before, self.sigma = self.sigma, self._pooled(self._values(self.x))
             # The weight of all data together changes nothing.
             if np.ptp(self.sigma / before) < _SAME_SIGMA:
                 break
+
+    def _grown(self) -> Array:
+        """Return x (p,) after fits to growing parts of the data: no pulse is ever far from its own.
+
+        The first part begins from the start, each other one from where the one before ended.
+        """
+        x = self.start
+        for share in _SHARES:
+            trials = [one for one in (trial.until(share) for trial in self.trials) if one.data]
+            if sum(len(one.t) for trial in trials for one in trial.data) > len(x):
+                part = Search(trials, self.free, self._told)
+                part.x, part.low = x, np.maximum(self.low, x - _REACH)
+                part.high = np.minimum(self.high, x + _REACH)
+                if np.isfinite(part._values(x)).all():
+                    part._settle()
+                    x = part.x
+        return x
+
+    def _unlikely(self) -> float:
+        """Return the negative logarithm of the data's likelihood at x, less a constant."""
+        squares = ((self.measured - self._values(self.x)) / self.sigma) ** 2
+        return float(np.sum(np.log(self.sigma) + 0.5 * squares))
+
+    def _compared(self) -> tuple[Series, ...]:
+        """Return the data with what the run at x says of them."""
+        values = self._values(self.x)
+        return tuple(
+            replace(one, fitted=values[part], sigma=self.sigma[part])
+            for one, part in zip(self._series, self._parts, strict=True)
+        )
 
     def report(self, scenario: str, level: float) -> Fit:
         """Return the fit at the values found."""
@@ -143,13 +196,14 @@ class Search:
             correlation = covariance / np.outer(deviations, deviations)
         correlation[~np.isfinite(deviations)] = correlation[:, ~np.isfinite(deviations)] = np.nan
         np.fill_diagonal(correlation, 1.0)
-        columns = self.free, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
+        # The unit of a stiffness follows from the exponent that was found.
+        built = self.trials[0].built
+        changed = change_scenario(built.scenario, self._changes(self.x), built.path)
+        found = [look_up(changed, one.keys[0], built.path) for one in self.free]
+        units = [meaning(changed, one).unit for one in found]
+        columns = self.free, units, self.x.tolist(), beyond.tolist(), (factor * deviations).tolist()
         fitted = tuple(_fitted(*one) for one in zip(*columns, strict=True))
-        values = self._values(self.x)
-        series = tuple(
-            replace(one, fitted=values[part], sigma=self.sigma[part])
-            for one, part in zip(self._series, self._parts, strict=True)
-        )
+        series = self._compared()
         remarks = remarks_on(fitted, correlation, blind, series, dof)
         if not self.converged:
             remarks.insert(0, "the search ended before the residuals were least: start nearer")
@@ -168,17 +222,22 @@ class Search:
                 self._known[key] = np.full(len(self.measured), np.nan)
         return self._known[key]
 
+    def _changes(self, x: Array) -> dict[str, str]:
+        pairs = zip(self.free, x.tolist(), strict=True)
+        return {key: one.text(value) for one, value in pairs for key in one.keys}
+
     def _run(self, x: Array) -> Array:
-        texts = [one.text(value) for one, value in zip(self.free, x.tolist(), strict=True)]
-        pairs = zip(self.free, texts, strict=True)
-        changes = {key: text for one, text in pairs for key in one.keys}
-        parts = []
+        changes, parts = self._changes(x), []
         for trial in self.trials:
             parts.append(trial.predict(changes))
-            self.count += 1
-            if self._progress is not None:
-                self._progress(self.count, self._misfit)
+            self._told(0, self._misfit)
         return np.concatenate(parts)
+
+    def _told(self, _: int, misfit: float) -> None:
+        """Count a run, of this search or of a part of it."""
+        self.count += 1
+        if self._progress is not None:
+            self._progress(self.count, misfit)
 
     def _residuals(self, x: Array) -> Array:
         # Where a run fails they are nan: the search then takes a shorter step.
@@ -278,7 +337,7 @@ def _quiet(sensor: Sensor) -> Sensor:
     return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
 
 
-def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
+def _fitted(one: Free, unit: str, x: float, beyond: float, half: float) -> Fitted:
     """Return a parameter with its interval, `half` to both sides of x + `beyond`; nan if held.
 
     It is not determined if that interval leaves its order of magnitude open: if it reaches from one
@@ -287,10 +346,10 @@ def _fitted(one: Free, x: float, beyond: float, half: float) -> Fitted:
     name, value = TIE.join(one.keys), float(one.text(x))
     if not math.isfinite(half):
         held = math.isnan(half)
-        return Fitted(name, one.unit, one.start, value, -half, half, held, held)
+        return Fitted(name, unit, one.start, value, -half, half, held, held)
     low, high = one.to_value(x + beyond - half), one.to_value(x + beyond + half)
     # One that must be positive is searched by its logarithm: its relative deviation is that of x.
     from_zero = half < 1.0 if one.log else one.low != 0.0 or low > 0.0
     determined = from_zero and not (low <= one.low and high >= one.high)
     low, high = max(low, one.low), min(high, one.high)
-    return Fitted(name, one.unit, one.start, value, low, high, determined)
+    return Fitted(name, unit, one.start, value, low, high, determined)
