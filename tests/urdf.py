@@ -4,9 +4,9 @@ from pathlib import Path
 
 
 def inertial(mass: float = 1.0, moment: float = 1.0) -> str:
+    moments = "".join(f'{axis}="{moment:g}" ' for axis in ("ixx", "iyy", "izz"))
     return (
-        f'<inertial><mass value="{mass:g}"/><inertia ixx="{moment:g}" iyy="{moment:g}" '
-        f'izz="{moment:g}" ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<inertial><mass value="{mass:g}"/><inertia {moments}ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 
@@ -23,15 +23,7 @@ def link(name: str, *parts: str) -> str:
     return f'<link name="{name}">{"".join(parts)}</link>'
 
 
-def joint(
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    *more: str,
-    at: str = "0 0 0",
-    axis: str = "0 1 0",
-) -> str:
+def joint(name, kind, parent, child, *more, at="0 0 0", axis="0 1 0") -> str:
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
