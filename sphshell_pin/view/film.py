@@ -155,7 +155,7 @@ def _times(
     if still:
         return (last if end is None else end,) * 2
     start, end = first if start is None else start, last if end is None else end
-    if not start <= end:
+    if not start < end:
         raise InvalidParameter("span", f"{start:g} to {end:g} s", "must end after it begins")
     return start, end
 
