@@ -17,7 +17,10 @@ from tests.programs import HEARS_CTRL_C, python
 from tests.scenario.files import DROP, write
 
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{}"/></robot>'
-URDF = "<robot name='a'><link name='b'/><joint name='{}'><parent link='b'/></joint></robot>"
+URDF = (
+    "<robot name='a'><link name='b'/>"
+    "<joint name='{}'><parent link='b'/><child link='c'/></joint></robot>"
+)
 COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands]
 
 
