@@ -21,7 +21,6 @@ from sphshell_pin.robots.files import RobotError as RobotError
 from sphshell_pin.robots.files import build_geometry as build_geometry
 from sphshell_pin.robots.files import build_model as build_model
 from sphshell_pin.robots.files import is_path as is_path
-from sphshell_pin.robots.files import keep_geometry_of as keep_geometry_of
 from sphshell_pin.robots.files import keep_spheres as keep_spheres
 from sphshell_pin.robots.files import read as read
 from sphshell_pin.robots.finding import is_library_name as is_library_name
@@ -30,9 +29,6 @@ from sphshell_pin.robots.inertia import few
 from sphshell_pin.robots.inertia import joints_without_mass as joints_without_mass
 from sphshell_pin.robots.inertia import mass_fault as mass_fault
 from sphshell_pin.robots.inertia import with_density as with_density
-from sphshell_pin.robots.mesh_spheres import MeshSpheres as MeshSpheres
-from sphshell_pin.robots.mesh_spheres import spheres_of_link as spheres_of_link
-from sphshell_pin.robots.mesh_spheres import spheres_of_mesh as spheres_of_mesh
 
 _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 

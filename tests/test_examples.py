@@ -26,6 +26,7 @@ FILES = {
     "07_peg_in_mujoco": "peg.png",
     "08_gripper_with_loops": "gripper.png",
     "09_wear_of_a_polished_part": "wear.png",
+    "10_link_of_spheres": "spheres.png",
 }
 # Objects that the last line of a cell shows.
 SHOWN = {
@@ -74,6 +75,16 @@ def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
 
 def test_every_example_is_tested():
     assert set(FILES) == set(NAMES)
+
+
+def check_link_of_spheres(names):
+    """No sphere reaches beyond the mesh, and they fill it."""
+    shell, centers, radii = names["shell"], names["centers"], names["radii"]
+    distances = shell.closest_points(centers, method="facets").distances
+    assert (radii <= -distances + 1e-12).all()
+    assert len(radii) == 32
+    assert names["farthest"] < 0.012
+    assert len(names["scene"].pairs) == 32
 
 
 def check_ball_on_a_surface(names):

@@ -3,10 +3,13 @@
 from pathlib import Path
 
 
-def inertial(mass: float = 1.0, moment: float = 1.0) -> str:
-    moments = "".join(f'{axis}="{moment:g}" ' for axis in ("ixx", "iyy", "izz"))
+def inertial(mass=1.0, moment=1.0, at=(0, 0, 0)) -> str:
+    """Mass, the moments of inertia about its center of mass, one or three, and where that is."""
+    x, y, z = moment if isinstance(moment, tuple) else (moment,) * 3
+    origin = f'<origin xyz="{at[0]:g} {at[1]:g} {at[2]:g}"/>' if any(at) else ""
     return (
-        f'<inertial><mass value="{mass:g}"/><inertia {moments}ixy="0" ixz="0" iyz="0"/></inertial>'
+        f'<inertial>{origin}<mass value="{mass:g}"/><inertia ixx="{x:g}" iyy="{y:g}" '
+        f'izz="{z:g}" ixy="0" ixz="0" iyz="0"/></inertial>'
     )
 
 
@@ -23,10 +26,10 @@ def link(name: str, *parts: str) -> str:
     return f'<link name="{name}">{"".join(parts)}</link>'
 
 
-def joint(name, kind, parent, child, *more, at="0 0 0", axis="0 1 0") -> str:
+def joint(name, kind, parent, child, *more, at="0 0 0", axis="0 1 0", rpy="0 0 0") -> str:
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
-        f'<origin xyz="{at}"/><axis xyz="{axis}"/>'
+        f'<origin xyz="{at}" rpy="{rpy}"/><axis xyz="{axis}"/>'
         f'<limit lower="-1" upper="1" effort="50" velocity="2"/>{"".join(more)}</joint>'
     )
 

@@ -48,8 +48,7 @@ def check_robot_(
     robot : Names of shipped robots (sphshell-pin list), or URDF, xacro (which is code) or MJCF
         files.
     every --all : Check every robot there is.
-    frame : Frame that carries the sphere; by default a known tip, or the end of the longest limb
-        and the outermost sphere inside its collision mesh.
+    frame : Frame that carries the sphere; by default a known tip, or the end of the longest limb.
     free_flyer : The root link of the URDF floats.
     mend OUT.urdf : Write a URDF of the robot that needs none of these options.
     quick : Fewer postures and runs.

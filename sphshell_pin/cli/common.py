@@ -69,10 +69,6 @@ CompiledOption = Annotated[
     bool, option("Move the robot by code compiled for it, as robot.compiled = true.", "--compiled")
 ]
 DurationOption = Annotated[float | None, option("Time to simulate \\[s] in place of run.duration.")]
-OfOption = Annotated[
-    str | None,
-    option("Scenario that a finished run is from, if it holds none, or another one.", "--scenario"),
-]
 RadiusOption = Annotated[
     str | None, option("Of the sphere: 0.012 \\[m] or 12mm.", metavar="LENGTH")
 ]

@@ -23,7 +23,6 @@ def export(
     run: common.RunArgument,
     to: str | None = None,
     out: Path | None = None,
-    of: common.OfOption = None,
 ) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
 
@@ -50,13 +49,13 @@ def export(
     if to == "mcap":
         from sphshell_pin.export.mcap import write_mcap
 
-        replay = Replay(file_of(run), of)
+        replay = Replay(file_of(run))
         files = [write_mcap(out or beside(run, ".mcap"), replay.result, replay.scene)]
     else:
         from sphshell_pin.export.tables import write_tables
 
         place = out or beside(run, f"_{to}")
-        files = write_tables(place, *with_scene(run, of), format=to)  # type: ignore[arg-type]
+        files = write_tables(place, *with_scene(run), format=to)  # type: ignore[arg-type]
     for file in files:
         common.echo(file)
 
@@ -75,17 +74,15 @@ def beside(run: Path, ending: str) -> Path:
     return named.with_name(named.name + ending)
 
 
-def with_scene(run: Path, scenario: str | None = None) -> tuple[Result, Scene | None]:
+def with_scene(run: Path) -> tuple[Result, Scene | None]:
     """Return a run and its scene; without one, say that joints have numbers instead of names."""
     from sphshell_pin.dynamics.result.result import Result
     from sphshell_pin.scenario.running.replay import Replay
 
     try:
-        replay = Replay(file_of(run), scenario)
+        replay = Replay(file_of(run))
         return replay.result, replay.scene
     except ResultError as fault:
-        if scenario is not None:
-            raise
         result = Result.load(file_of(run))
         common.echo(f"warning: joints have numbers instead of names: {fault}", err=True)
         return result, None

@@ -19,7 +19,6 @@ def view(
     port: int = 0,
     open_: bool = True,
     color: str = "surface",
-    of: common.OfOption = None,
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
@@ -47,10 +46,8 @@ def view(
         if changes:
             key = next(iter(changes))
             raise InvalidParameter(key, changes[key], "cannot be changed: this is a finished run")
-        _play(finished, of, speed, color, open_=open_)
+        _play(finished, speed, color, open_=open_)
         return
-    if of is not None:
-        raise SphshellError(f"{scenario} is a scenario itself: only a finished run needs one")
     preview(
         scenario,
         changes=changes,
@@ -64,13 +61,13 @@ def view(
     )
 
 
-def _play(file: Path, of: str | None, speed: float | None, color: str, *, open_: bool) -> None:
+def _play(file: Path, speed: float | None, color: str, *, open_: bool) -> None:
     """Write the recording of a finished run beside it, and open it."""
     from sphshell_pin.scenario.running.replay import Replay
     from sphshell_pin.view.live.opening import open_file
     from sphshell_pin.view.recording import write_recording
 
-    replay = Replay(file, of)
+    replay = Replay(file)
     path = write_recording(
         file.with_suffix(".html"),
         replay.result,
@@ -99,7 +96,6 @@ def render(
     camera: str = "fit",
     chart: bool = True,
     dark: bool = False,
-    of: common.OfOption = None,
 ) -> None:
     """Draw a finished run: one picture or a film.
 
@@ -133,7 +129,7 @@ def render(
             f"{run} is no finished run: give its results folder or run.npz, which "
             "sphshell-pin run writes"
         )
-    replay = Replay(file, of)
+    replay = Replay(file)
     with common.progress_bar(str(out), total=None) as update:
         drawn = render_film(
             out,

@@ -15,7 +15,7 @@ from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.result.result_scene import scene_of, sound_rows
+from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import arrows as arrow
@@ -245,6 +245,7 @@ def view_result(
     if isinstance(height, bool) or not isinstance(height, int) or height <= 0:
         raise InvalidParameter("height", height, "must be a positive number of pixels")
     shown = Shown.of(result, scene, visual_model, title, speed)
+    check_scene(result, shown.scene, "the result")
     bare = shown.visual_model is None and has_links(shown.scene.model)
     return RecordingView(shown.page(), height, BARE if bare else "")
 

@@ -177,7 +177,7 @@ def test_what_does_not_fit_is_said(result: sp.Result, what: str) -> None:
     found, (change, words) = kept_of(result), WRONG[what]
     contents, arrays = found.contents, dict(found.arrays)
     change(contents, arrays)
-    with pytest.raises(ResultError, match=words + r".*--scenario"):
+    with pytest.raises(ResultError, match=words + r".*its scene can be given"):
         Replay(with_kept(result, Kept(contents, arrays)))
 
 

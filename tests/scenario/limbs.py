@@ -3,17 +3,27 @@
 from tests import urdf
 from tests.urdf import inertial, shape
 
-HINGE = "revolute", "0 0 1", "0 1 0"
 
-
-def link(name: str, size: str = "", at: str = "0 0 0", *parts: str) -> str:
-    """A link of 1 kg, with a box if it has a size."""
+def link(name: str, size: str = "", at: str = "0 0 0", *parts: str, mass: float = 1.0) -> str:
+    """A link with a box, if it has a size."""
     box = [shape("collision", f'<box size="{size}"/>', at)] if size else []
-    return urdf.link(name, inertial(1, 0.01), *box, *parts)
+    return urdf.link(name, inertial(mass, 0.01), *box, *parts)
 
 
-def joint(name: str, parent: str, child: str, kind: str, at: str, axis: str, *more: str) -> str:
-    return urdf.joint(name, kind, parent, child, *more, at=at, axis=axis)
+def limb(
+    name: str,
+    parent: str,
+    at: str,
+    *body: str,
+    kind: str = "revolute",
+    axis: str = "0 1 0",
+    limits: tuple[float, float] = (-1, 1),
+    more: str = "",
+) -> str:
+    """A link, as `link` makes it of `body`, on a joint of its parent that is called NAME_j."""
+    joint = urdf.joint(f"{name}_j", kind, parent, name, more, at=at, axis=axis)
+    low, high = limits
+    return link(name, *body) + joint.replace('"-1" upper="1"', f'"{low}" upper="{high}"')
 
 
 def ball(radius: str, at: str = "0 0 0") -> str:

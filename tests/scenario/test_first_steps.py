@@ -6,8 +6,7 @@ import pytest
 
 from sphshell_pin.scenario import build
 from tests.command import call
-from tests.scenario.files import DROP, write
-from tests.scenario.test_new import arm_urdf
+from tests.scenario.files import DROP, arm_urdf, write
 
 
 def told(*arguments):
@@ -39,13 +38,6 @@ def test_a_scenario_is_found_by_its_whole_name(tmp_path):
     assert code == 2
     assert f"did you mean {path}" in output.replace("\n", "")
     assert "is a folder" in told("explain", tmp_path)[1]
-
-
-def test_a_key_without_its_table_is_recognised(tmp_path):
-    path = write(tmp_path, DROP)
-    code, output = told("explain", path, "--set", "duration=2")
-    assert code == 2
-    assert "did you mean 'run.duration'?" in output
 
 
 def test_another_integrator_leaves_the_old_ones_settings_behind(draft):

@@ -62,17 +62,6 @@ def test_a_part_weighs_what_its_material_weighs():
     assert loaded.model.nq == 7
 
 
-def test_an_open_surface_has_no_weight(tmp_path):
-    with pytest.raises(SphshellError, match="is open, so it has no weight"):
-        new_scenario(GRIPPER, sheet(tmp_path), tips="all", unit="m", out=out(tmp_path))
-
-
-def sheet(folder):
-    file = folder / "sheet.obj"
-    file.write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n", encoding="utf-8")
-    return file
-
-
 def out(folder):
     return folder / "made.toml"
 
@@ -168,29 +157,3 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
     assert built.scene.model.nv == 4 + 6
     assert built.scenario.robot[0].joints == ["limits", "friction", "effort", "speed"]
     run_well(built)
-
-
-@pytest.mark.parametrize(
-    ("options", "why"),
-    [
-        ({"surface": "plane"}, "a hand cannot hold a plane"),
-        ({"place": "below"}, "--place belongs to a single tip"),
-        ({"radius": 0.01}, "--radius belongs to a single tip"),
-        ({"robot": "three_link_finger"}, "needs two fingertips or more"),
-        ({"robot": "turntable"}, "this robot has 1"),
-        pytest.param({"against": "steel", "press": 500.0}, "no grasp .* works"),
-        ({"unit": "m", "surface": "large"}, "cannot hold a part of 400 x 400 x 400 mm"),
-    ],
-)
-def test_what_cannot_be_held_is_refused(options, why, tmp_path):
-    options = {"robot": GRIPPER, "surface": "box", **options}
-    if options["surface"] == "large":
-        import trimesh
-
-        options["surface"] = tmp_path / "large.stl"
-        trimesh.creation.box((0.4, 0.4, 0.4)).export(options["surface"])
-    robot, surface = options.pop("robot"), options.pop("surface")
-    with pytest.raises(SphshellError, match=why):
-        new_scenario(robot, surface, tips="all", out=out(tmp_path), **options)
-    assert not out(tmp_path).exists()
-    assert not (tmp_path / "made_part.urdf").exists()

@@ -54,29 +54,6 @@ def test_any_number_may_be_a_knob(key, more, unit, value, restart, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        (knob("contact.ball-plate.law.stifness"), r"no 'stifness'.*did you mean 'stiffness'"),
-        (knob("contact.tip.law.stiffness"), r"there are: ball-plate"),
-        (knob("shell.plate.name"), r"shell\.plate\.name: is not a number"),
-        (knob("run.rtol"), r"run\.rtol: is not a number"),
-        (knob("contact.ball-plate.law"), r"is not a number"),
-        (knob(STIFFNESS) + knob(STIFFNESS), r"knob\[1\]\.key: is a knob already"),
-        (knob(STIFFNESS) + knob("contact.0.law.stiffness"), r"is a knob already"),
-        (knob(STIFFNESS, "min = 2e6\nmax = 3e6"), r"outside its range 2e\+06 to 3e\+06"),
-        (knob(STIFFNESS, "min = 3e6\nmax = 2e6"), r"min 3e\+06 must be less than max 2e\+06"),
-        (knob(STIFFNESS, "min = 0\nmax = 2e6\nlog = true"), r"min must be positive with log"),
-        (knob("gravity.2"), r"needs min and max, as 'gravity.2' is not positive"),
-        (knob(STIFFNESS, "mim = 3"), r"did you mean 'min'"),
-    ],
-)
-def test_a_wrong_knob_is_told_when_the_scenario_is_built(text, match, tmp_path):
-    with pytest.raises(ScenarioError, match=match) as caught:
-        build(write(tmp_path, DROP + text))
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
     "name", mostly_studies(shipped_scenarios(), {"fingertip_on_blade", "gear_contact"}.__contains__)
 )
 def test_shipped_knobs_hold_over_their_range(name):
@@ -84,18 +61,11 @@ def test_shipped_knobs_hold_over_their_range(name):
     knobs = live_parameters(built)
     assert knobs
     for one in knobs:
-        if one.choices:
-            for word in one.choices:
-                (again,) = (
-                    k for k in live_parameters(rebuild(built, {one.key: word})) if k.key == one.key
-                )
-                assert again.value == word
-            continue
-        assert one.low <= one.value <= one.high
-        for value in (one.low, one.high):
-            turned = rebuild(built, {one.key: repr(value)})
-            (again,) = (k for k in live_parameters(turned) if k.key == one.key)
-            assert again.value == pytest.approx(value, rel=1e-12)
+        assert one.choices or one.low <= one.value <= one.high
+        for value in one.choices or (one.low, one.high):
+            turned = rebuild(built, {one.key: str(value)})
+            (again,) = (k.value for k in live_parameters(turned) if k.key == one.key)
+            assert again == value or again == pytest.approx(value, rel=1e-12)
 
 
 def test_a_rebuild_keeps_what_did_not_change(tmp_path):
@@ -142,13 +112,6 @@ def test_a_rebuild_moves_as_a_fresh_build_does(tmp_path, name, changes):
     np.testing.assert_array_equal(runs[0].q, runs[1].q)
 
 
-def test_a_refused_change_leaves_the_scenario_alone(tmp_path):
-    built = build(write(tmp_path))
-    with pytest.raises(ScenarioError, match=r"contact\.ball-plate\.law\.stiffness"):
-        rebuild(built, {STIFFNESS: "-1"})
-    assert rebuild(built, {}).scenario == built.scenario
-
-
 def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
     key = "contact.ball-plate.law.damping"
     path = write(tmp_path, DROP + knob(key))
@@ -164,10 +127,7 @@ def test_a_knob_without_a_range_may_be_set_to_zero(tmp_path):
 
 def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
     adams = 'law = { type = "adams", units = "in-lbf-s" }'
-    hertz = (
-        'law = { type = "hertz", radius = 0.01, young = 1e9, poisson = 0.3, young_2 = 1e9, '
-        "poisson_2 = 0.3, restitution = 0.5, speed = 1 }"
-    )
+    hertz = 'law = { type = "hertz", young = 1e9, poisson = 0.3, restitution = 0.5, speed = 1 }'
     law = next(line for line in DROP.splitlines() if line.startswith("law"))
     for text, key, label, unit, high in (
         (adams, "k", "stiffness", "lbf/in^2.2", 1e6),
@@ -183,19 +143,6 @@ def test_labels_units_and_limits_are_those_of_the_description(tmp_path):
 
 METHOD = "contact.ball-plate.method"
 WITH_METHOD = DROP.replace('shell = "plate"\n', 'shell = "plate"\nmethod = "smooth"\n')
-
-
-@pytest.mark.parametrize(
-    ("text", "more", "says"),
-    [
-        (DROP, "", "is not set"),
-        (WITH_METHOD, "min = 1", "is for numbers"),
-        (WITH_METHOD, 'unit = "m"', "is for numbers"),
-    ],
-)
-def test_a_word_that_cannot_be_a_knob(text, more, says, tmp_path):
-    with pytest.raises(ScenarioError, match=says):
-        build(write(tmp_path, text + knob(METHOD, more)))
 
 
 def test_a_word_acts_on_the_run_under_way(tmp_path):

@@ -8,29 +8,13 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter, SphshellError
+from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.touch_points import sides
 from sphshell_pin.scenario.running.run import simulate
 from tests.scenario.files import center_of
-from tests.scenario.test_new import arm_urdf
 
 GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
-PLATE = (0.3, 0.24, 0.04)
-
-
-@pytest.fixture
-def plate(tmp_path):
-    """Write a plate that lies above the origin of its file; return the file."""
-    path = tmp_path / "plate.shl"
-    box = sp.Shell.from_geometry(coal.Box(*PLATE))
-    box.transformed(pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.02]))).to_file(path)
-    return path
-
-
-@pytest.fixture
-def arm(tmp_path):
-    return arm_urdf(tmp_path)
 
 
 def placed(built):
@@ -155,22 +139,3 @@ def test_the_points_of_a_path_are_taken_over(arm, plate, draft):
     result, _ = simulate(built)
     center = center_of(built, result.q[-1])
     np.testing.assert_allclose(center[:2], points[-1][:2], atol=0.003)
-
-
-@pytest.mark.parametrize(
-    ("options", "error", "match"),
-    [
-        ({"at": (1.0, 0.0, 0.0)}, SphshellError, r"\[1, 0, 0\] is 850 mm off the surface"),
-        ({"at": (1.0, 0.0)}, InvalidParameter, r"must have shape \(3,\)"),
-        ({"path": "spiral"}, InvalidParameter, "must be line, circle, raster, or points"),
-        ({"path": "1,2; 3,4"}, InvalidParameter, "must be line, circle, raster, or points"),
-        ({"path": "line", "length": 1.0}, SphshellError, "cannot be taken: .*shorter --length"),
-        ({"length": 0.1}, InvalidParameter, "belongs to a path of line, circle, raster"),
-        ({"path": [[0, 0, 0.04]], "at": (0, 0, 0.04)}, InvalidParameter, "leave it out"),
-    ],
-)
-def test_what_cannot_be_asked(options, error, match, arm, plate, draft, tmp_path):
-    with pytest.raises(error, match=match) as caught:
-        draft(arm, plate, radius=0.01, **options)
-    assert "\n" not in str(caught.value)
-    assert not (tmp_path / "a.toml").exists()

@@ -8,6 +8,7 @@ import shutil
 import signal
 import stat
 import time
+from unittest.mock import Mock
 
 import pytest
 
@@ -62,11 +63,8 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
     arguments = ["run", write(tmp_path), "--out", tmp_path / "out", "--no-recording"]
     succeed(*arguments)
     before = (tmp_path / "out" / LAST).read_bytes()
-
-    def full(*_, **__):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
     # In the pictures, when the numbers are written already.
+    full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     monkeypatch.setattr("sphshell_pin.base.atomic.file.atomic_file", full)
     told = call(*arguments)
     assert told.exit_code == 2
@@ -76,10 +74,7 @@ def test_a_full_disk_is_one_sentence_and_exit_code_2(tmp_path, monkeypatch):
 
 
 def test_ctrl_c_while_pictures_are_drawn_keeps_the_numbers(tmp_path, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("sphshell_pin.plot.save_figures", interrupted)
+    monkeypatch.setattr("sphshell_pin.plot.save_figures", Mock(side_effect=KeyboardInterrupt))
     told = call("run", write(tmp_path), "--out", tmp_path / "out")
     assert told.exit_code == 130
     assert f"the results are in {tmp_path / 'out'}" in told.stderr
@@ -123,18 +118,13 @@ def test_a_file_written_by_others_meanwhile_is_kept(tmp_path, monkeypatch):
     assert (out / "notes.txt").read_text() == "second"
 
 
-def never_exchanged(monkeypatch):
-    monkeypatch.setattr(
-        "sphshell_pin.base.atomic.files.exchange", lambda *_: pytest.fail("it was exchanged")
-    )
-
-
 @pytest.mark.parametrize("why", ["working directory", "mount point", "folders of others"])
 def test_a_folder_that_must_stay_gets_its_files_one_by_one(why, tmp_path, monkeypatch):
     out = tmp_path / "out"
     put(out, "old")
     (out / "b").write_text("old")
-    never_exchanged(monkeypatch)
+    exchanged = "sphshell_pin.base.atomic.files.exchange"
+    monkeypatch.setattr(exchanged, lambda *_: pytest.fail("it was exchanged"))
     if why == "working directory":
         monkeypatch.chdir(out)
     elif why == "mount point":
@@ -178,15 +168,8 @@ def test_a_file_keeps_its_rights(tmp_path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def refuse_locks(monkeypatch):
-    def none(*_):
-        raise OSError(errno.ENOLCK, "No locks available")
-
-    monkeypatch.setattr(fcntl, "flock", none)
-
-
 def test_a_file_system_without_locks_will_do(tmp_path, monkeypatch):
-    refuse_locks(monkeypatch)
+    monkeypatch.setattr(fcntl, "flock", Mock(side_effect=OSError(errno.ENOLCK, "No locks")))
     put(tmp_path / "out", "old")
     assert put(tmp_path / "out", "new") == {"a": "new", LAST: "new"}
     with atomic_file(tmp_path / "file") as file:
@@ -215,16 +198,11 @@ def test_a_folder_called_like_a_result_is_told(no_pictures, tmp_path):
 
 def test_a_folder_made_in_vain_is_removed(tmp_path):
     out = tmp_path / "x" / "y"
-
-    def refuse():
-        with AtomicFolder(out, last=LAST):
-            with pytest.raises(FolderInUse), AtomicFolder(out, last=LAST):
-                pass
-            assert out.is_dir()
-            raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        refuse()
+    with contextlib.suppress(ZeroDivisionError), AtomicFolder(out, last=LAST):
+        with pytest.raises(FolderInUse), AtomicFolder(out, last=LAST):
+            pass
+        assert out.is_dir()
+        raise ZeroDivisionError
     assert os.listdir(tmp_path) == []
 
 

@@ -9,10 +9,8 @@ import sphshell_pin as sp
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from sphshell_pin.scenario.running.replay import Replay
-from tests.scenario.files import DROP, write
-from tests.texts import text_of
+from tests.scenario.files import DROP, SENSORS, write
 
-SENSORS = text_of("scenarios/sensors.toml")
 READING = """
 def tau(t, q, v, contacts, sensors):
     push = [0.0] * 6
@@ -24,7 +22,7 @@ def tau(t, q, v, contacts, sensors):
 def test_a_scenario_states_its_sensors(tmp_path):
     (tmp_path / "own.py").write_text(READING, encoding="utf-8")
     controller = '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'
-    path = write(tmp_path, DROP + SENSORS + controller)
+    path = write(tmp_path, SENSORS + controller)
     report = run_scenario(path, tmp_path / "out", recording=False)
     names = {file.name for file in report.files}
     assert {"sensors.csv", "sensors.png"} <= names
@@ -52,31 +50,12 @@ def test_readings_are_figures(tmp_path, no_pictures):
 "sensors.inside.force_z.last" = { min = -1.0, max = 1.0 }
 "sensors.inside.torque_x.mean" = { max = 1.0 }
 """
-    report = run_scenario(write(tmp_path, DROP + SENSORS + expect), tmp_path, recording=False)
+    report = run_scenario(write(tmp_path, SENSORS + expect), tmp_path, recording=False)
     assert [one.met for one in report.verdicts] == [True] * 3
     log = report.result.sensors["inside"].values
     assert [one.measured for one in report.verdicts] == [1.0, log[-1, 2], log[:, 3].mean()]
     with pytest.raises(ScenarioError, match=r"nearest ones are: sensors\.inside\.force_"):
-        run_scenario(write(tmp_path, DROP + SENSORS + expect.replace("force_z", "force")))
-
-
-@pytest.mark.parametrize(
-    ("changed", "said"),
-    [
-        (('frame = "root_joint"', 'frame = "tip"'), r"sensor.inside: no frame 'tip'"),
-        (('type = "force-torque"', 'type = "force"'), "unknown type 'force'; valid types: force-"),
-        (("rate = 500", "rte = 500"), "sensor.inside.rte: unknown key; did you mean 'rate'"),
-        (("rate = 500", "rate = -500"), "sensor.inside.rate: should be greater than 0"),
-        (('contact = "ball-plate"', 'contact = "b"'), "sensor.touch: no contact 'b'"),
-        (('name = "touch"', 'name = "inside"'), r"sensor: sensors\[1\].name = 'inside' is taken"),
-        (("threshold = 0.5", ""), "sensor.touch.threshold: is missing"),
-    ],
-)
-def test_a_wrong_sensor_is_named_with_its_key(changed, said, tmp_path):
-    text = SENSORS[: SENSORS.index("[[knob]]")]
-    path = write(tmp_path, (DROP + text).replace(*changed))
-    with pytest.raises(ScenarioError, match=said):
-        build(path)
+        run_scenario(write(tmp_path, SENSORS + expect.replace("force_z", "force")))
 
 
 def test_a_single_table_will_do(tmp_path):

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build, run_scenario
 from tests.command import call
-from tests.scenario.files import write
-from tests.texts import text_of
+from tests.scenario.files import EGG, HAND, TWO_BALLS, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
-
-LAW = 'law = { type = "hunt-crossley", stiffness = 1e6, dissipation = 0.5 }\n'
-TWO_BALLS = text_of("scenarios/two_balls.toml")
-HAND = text_of("scenarios/hand.toml")
 
 
 def test_a_ball_falls_on_a_ball(tmp_path):
@@ -38,9 +32,6 @@ def test_collision_spheres_of_a_hand(tmp_path):
     assert {pair.group for pair in scene.pairs} == {"tips"}
 
 
-EGG = text_of("scenarios/egg.toml")
-
-
 def test_an_egg_falls_on_a_plane(tmp_path):
     report = run_scenario(write(tmp_path, EGG), tmp_path / "out", recording=False)
     pair = report.built.scene.pair("table")
@@ -50,49 +41,6 @@ def test_an_egg_falls_on_a_plane(tmp_path):
     assert touch.t == pytest.approx(np.sqrt(2 * 0.001 / 9.81), rel=1e-3)
     rows = report.result.contacts
     assert rows.normal_world == pytest.approx(np.tile([0, 0, -1.0], (len(rows.depth), 1)))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "what"),
-    [
-        ("plane =", 'sphere = {frame = "ball", radius = 0.01}\nplane =', "contact.table: give"),
-        ('shell = "egg"', 'other_sphere = {frame = "ball", radius = 0.01}', "touches a shell"),
-        ('shell = "egg"', 'shell = "egg"\nmethod = "facets"', "must be 'smooth'"),
-        ("[0.0, 0.0, 2.0]", "[0.0, 0.0, 0.0]", "must not be zero"),
-    ],
-)
-def test_what_is_wrong_with_a_plane(old, new, what, tmp_path):
-    with pytest.raises(ScenarioError, match=what):
-        build(write(tmp_path, EGG.replace(old, new, 1)))
-
-
-SPHERE = 'sphere = { frame = "upper/ball", radius = 0.012 }'
-FIRST = '{ frame = "upper/ball", radius = 0.012 },'
-BALLS = 'other_sphere = { frame = "lower/ball", radius = 0.012 }'
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "what"),
-    [
-        (BALLS, "", "contact.balls: give either shell .* or other_sphere, not both"),
-        (BALLS, f'{BALLS}\nshell = "plate"', "contact.balls: give either shell"),
-        (BALLS, f'{BALLS}\nmethod = "smooth"', "contact.balls: method belongs to a shell"),
-        ("spheres = [", f"{SPHERE}\nspheres = [", "contact.floor: give either sphere "),
-        ('"lower/ball", radius', '"ball", radius', "contact.balls: .*'ball'"),
-        (FIRST, '"universe",', "contact.floor.spheres: frame 'universe' has no sphere in its coll"),
-        (FIRST, '"hand",', "contact.floor.spheres: .*'hand'"),
-    ],
-)
-def test_what_is_wrong_with_the_ends_of_a_contact(old, new, what, tmp_path):
-    assert TWO_BALLS.count(old) >= 1
-    with pytest.raises(ScenarioError, match=what):
-        build(write(tmp_path, TWO_BALLS.replace(old, new, 1)))
-
-
-def test_no_collision_spheres(tmp_path):
-    text = HAND.replace("allegro_right_hand", "turntable")
-    with pytest.raises(ScenarioError, match=r"contact.tips.spheres: no collision geometry of the"):
-        build(write(tmp_path, text))
 
 
 def test_the_table_of_many_contacts_lists_the_largest(tmp_path):

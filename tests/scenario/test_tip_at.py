@@ -4,12 +4,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 from tests import models
 from tests.scenario import files
-from tests.scenario.test_new import arm_urdf
+from tests.scenario.files import arm_urdf
 from tests.texts import text_of
 
 SCENARIO = text_of("scenarios/tip_at.toml")
@@ -66,33 +65,6 @@ def test_places_are_those_of_the_world(tmp_path):
         pose_of(built, "one/link_5").act(np.array([0, 0, 0.2])), XYZ, atol=1e-6
     )
     np.testing.assert_allclose(pose_of(built, "two/link_5").translation, [0.8, 0.2, 0.3], atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("start", "match"),
-    [
-        (
-            "{ tip_at = [3, 0, 0] }",
-            r"tip_at: the tip on frame 'link_5' comes no nearer than [\d.e+]",
-        ),
-        ("{ tip_at = [3, 0] }", r"start.tip_at must be \[x, y, z\] or a table"),
-        ("{ tip_at = { xyz = [0.4, 0, 0.3], along = [0, 0, 0] } }", "along must be a direction"),
-        ("{ tip_at = { xyz = [0.4, 0, 0.3], frame = 'lnk_5' } }", "no frame 'lnk_5'"),
-        ("{ tip_at = { xy = [0.4, 0, 0.3] } }", "did you mean 'xyz'"),
-        ("{ joint_1 = { xyz = [0.4, 0, 0.3] } }", "the table of a tip is start.tip_at"),
-        ("{ tip_at = { xyz = [0.0, 0.0, 1.39], along = [0, 0, -1] } }", "with its z axis along"),
-    ],
-)
-def test_what_cannot_be_is_said_in_one_sentence(start, match, tmp_path):
-    with pytest.raises(ScenarioError, match=match) as caught:
-        build(scenario(tmp_path, start))
-    assert "\n" not in str(caught.value)
-
-
-def test_a_tip_without_a_contact_needs_its_frame(tmp_path):
-    path = scenario(tmp_path, f"{{ tip_at = {XYZ} }}", sphere="universe")
-    with pytest.raises(ScenarioError, match="name the frame of the tip"):
-        build(path)
 
 
 @pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), np.array([2.0, -1.0, 2.0]) / 3])

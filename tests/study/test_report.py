@@ -13,18 +13,11 @@ import pytest
 
 from sphshell_pin import Shell
 from sphshell_pin.errors import Interrupted
-from sphshell_pin.study.report import (
-    PAGE,
-    closed_forms,
-    convergence,
-    machine,
-    making,
-    steps,
-    surfaces,
-)
+from sphshell_pin.study.report import PAGE, closed_forms, convergence, making, steps, surfaces
 from sphshell_pin.study.report import integrators as work
 from sphshell_pin.study.report import queries as query_section
 from sphshell_pin.study.report.contents import Column, Finding, Section, Table
+from sphshell_pin.study.report.machine import BUSY
 from tests.command import call
 
 KEYS = ["forces", "queries", "integrators", "steps"]
@@ -77,16 +70,8 @@ def parts_of(*measures) -> tuple[making.Part, ...]:
 
 @pytest.fixture
 def small(monkeypatch):
-    """All sections on little data, and a way to put another measure in the place of one."""
-
-    def put(**others) -> None:
-        measures = {
-            "forces": forces, "queries": queries, "integrators": integrators, "steps": panda,
-        } | others  # fmt: skip
-        monkeypatch.setattr(making, "PARTS", parts_of(*measures.values()))
-
-    put()
-    return put
+    """All sections on little data."""
+    monkeypatch.setattr(making, "PARTS", parts_of(forces, queries, integrators, panda))
 
 
 def stub(*, quick, progress):
@@ -94,10 +79,15 @@ def stub(*, quick, progress):
 
 
 @pytest.fixture
-def stubs(small):
-    """Sections of nothing but one finding."""
-    small(**dict.fromkeys(KEYS, stub))
-    return small
+def stubs(monkeypatch):
+    """Sections of nothing but one finding, and a way to put other measures in their places."""
+
+    def put(**others) -> None:
+        measures = dict.fromkeys(KEYS, stub) | others
+        monkeypatch.setattr(making, "PARTS", parts_of(*measures.values()))
+
+    put()
+    return put
 
 
 def table_of(path):
@@ -144,9 +134,8 @@ def test_spheres_touch_its_surfaces_as_deep_as_it_says() -> None:
 
 
 def test_order_and_error_of_a_power_law():
-    line = [
-        SimpleNamespace(side=h, mean=0.7 * h**4, largest=3 * h**4) for h in (1.2, 0.61, 0.29, 0.16)
-    ]
+    sides = (1.2, 0.61, 0.29, 0.16)
+    line = [SimpleNamespace(side=h, mean=0.7 * h**4, largest=3 * h**4) for h in sides]
     assert convergence.order(line) == pytest.approx(4.0)
     assert convergence.error_at(line) == pytest.approx(0.7 * 0.3**4)
     assert convergence.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
@@ -157,7 +146,7 @@ def broken(*, quick, progress):
 
 
 def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
-    stubs(**dict.fromkeys(KEYS, stub) | {"queries": broken})
+    stubs(queries=broken)
     ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 1
     assert "not measured: Time of a query: ValueError: a <b> broke" in ran.stderr
@@ -166,11 +155,11 @@ def test_a_broken_section_does_not_lose_the_others(stubs, tmp_path):
     assert "3 of 3 aims are met. 1 section could not be measured." in text
 
 
-@pytest.mark.parametrize("load", [0.0, machine.BUSY, 1.5])
+@pytest.mark.parametrize("load", [0.0, BUSY, 1.5])
 def test_a_busy_machine_is_said_on_the_page(stubs, tmp_path, monkeypatch, load):
     monkeypatch.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0))
     ran = call("report", "--out", tmp_path)
-    busy = load > machine.BUSY
+    busy = load > BUSY
     page = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert ("The machine was busy" in page) == busy
     assert ("The machine was busy" in ran.stderr) == busy
@@ -188,7 +177,7 @@ def test_an_interrupted_run_leaves_the_old_page(stubs, tmp_path, kind):
     def interrupted(*, quick, progress):
         raise kind
 
-    stubs(**dict.fromkeys(KEYS, stub) | {"steps": interrupted})
+    stubs(steps=interrupted)
     ran = call("report", "--out", tmp_path)
     assert ran.exit_code == 130
     assert {f.name: f.read_bytes() for f in tmp_path.iterdir()} == before
@@ -199,10 +188,10 @@ def test_tables_of_an_old_report_go(stubs, tmp_path):
         return Section("x", "X", tables=[Table("old", "", (Column("a", "a"),), [(1.0,)])])
 
     (tmp_path / "mine.csv").write_text("keep me")
-    stubs(**dict.fromkeys(KEYS, stub) | {"steps": with_table})
+    stubs(steps=with_table)
     making.make_report(tmp_path)
     assert (tmp_path / "old.csv").read_text() == "a\n1.0\n"
-    stubs(**dict.fromkeys(KEYS, stub))
+    stubs()
     making.make_report(tmp_path)
     assert not (tmp_path / "old.csv").exists()
     assert (tmp_path / "mine.csv").read_text() == "keep me"

@@ -60,10 +60,8 @@ def test_faults_are_one_sentence(tmp_path, finished):
             ([scenario, "--color", "red"], "surface, faces"),
             ([scenario, "--port", "70000"], "65535"),
             ([scenario, "--port", live.server.port], "another port"),
-            ([scenario, "--scenario", "gear_contact"], "only a finished run"),
             ([finished, "--set", "gravity.2=0"], "finished run"),
             ([tmp_path], "has no run.npz"),
-            ([finished, "--scenario", "gear_contact"], "nq"),
         ):
             assert words in refused("view", *arguments, "--no-open")
 

@@ -93,16 +93,6 @@ def test_the_last_browser_drags_and_only_it_releases(arm):
     assert arm.player.drag is None
 
 
-def test_while_it_drags_no_button_pushes(ball):
-    say(ball, "hold", OTHER_TAB, body="ball", direction=[1.0, 0.0, 0.0], newtons=1.0)
-    drag(ball, [0.0, 0.0, 0.1], node="/meshcat/spheres/0_ball-plate", point=[0.0, 0.0, 0.0])
-    frames(ball, 10)
-    assert ball.player.drag is not None
-    say(ball, "release")
-    frames(ball, 10)
-    assert ball.player.v[0] > 0.0
-
-
 def test_messages_that_cannot_be_are_one_sentence_and_the_run_goes_on(arm):
     drag(arm, [1.0, 0.0, 0.5], node="/meshcat/robot/visuals/base_0")
     drag(arm, [1.0, 0.0, 0.5], node="nothing")

@@ -199,3 +199,9 @@ def test_quantities_and_their_curves_can_be_chosen(opened, tmp_path):
     assert live._charts.keys == ("q.knuckle", "q.distal_joint")
     tab.page.locator("h1").click()
     assert not tab.page.locator("#curve-list").is_visible()
+    # Both runs are compared at the same simulated time.
+    rows = "run => chart[run].rows.map((row) => row.slice(0, 2))"
+    before = tab.page.evaluate(rows, "run")
+    tab.click("#reset")
+    tab.wait("state.t === 0 && chart.ghost")
+    assert tab.page.evaluate(rows, "ghost") == before

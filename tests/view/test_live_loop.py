@@ -105,18 +105,6 @@ def test_a_push_has_its_direction_force_and_time(make):
     assert live.player.v[1] == pytest.approx(6.0 * 0.25, rel=0.01)
 
 
-def test_what_is_held_pushes_until_it_is_let_go(make):
-    live = make()
-    say(live, "hold", **PUSH, newtons=3.0)
-    frames(live, 60)
-    assert live.player.v[0] == pytest.approx(3.0, rel=0.02)
-    live.server.leave(TAB)
-    frames(live, 2)
-    speed = live.player.v[0]
-    frames(live, 30)
-    assert live.player.v[0] == speed
-
-
 @pytest.mark.parametrize("what", ["player.advance", "picture.update"])
 @pytest.mark.parametrize(
     "fault", [SimulationDiverged(0.5, "it blew up", None), ZeroDivisionError("no direction")]

@@ -49,9 +49,9 @@ def test_several_browsers_follow_each_other(live):
             await one.say("parameter", key="stiffness", value=7000.0)
             await one.say("speed", value=0.5)
             await one.say("show", part="trails", on=False)
-            await two.until(lambda c: c.state and c.state["speed"] == 0.5)
+            await two.until(lambda c: c.state and not c.state["show"]["trails"])  # said last
             assert two.state["parameters"]["stiffness"] == 7000.0
-            assert two.state["show"]["trails"] is False
+            assert two.state["speed"] == 0.5
             await two.say("run", on=False)
             await one.until(lambda c: not c.state["running"])
 

@@ -247,7 +247,7 @@ class Origin:
     """The scenario that ran: `scenario`, a shipped name or a path, with all its `settings`.
 
     The settings, as JSON knows them, are those of the run, changed ones included. `keep` gives the
-    robots and surfaces as they were used; None where an earlier version saved the result.
+    robots and surfaces as they were used; None where they were not kept.
     """
 
     scenario: str

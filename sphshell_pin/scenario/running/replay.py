@@ -14,13 +14,13 @@ from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ResultError, SlowLawWarning, SphshellError
 from sphshell_pin.scenario.format.build import Built, build_scenario
 from sphshell_pin.scenario.format.functions import unloaded
-from sphshell_pin.scenario.format.reading import find_scenario, read_scenario, shipped_scenarios
+from sphshell_pin.scenario.format.reading import shipped_scenarios
 from sphshell_pin.scenario.format.schema import Scenario
 from sphshell_pin.scenario.running.kept_scenario import restore
 
 # What moves the bodies, and what judges the outcome, is not needed to show them.
 UNSHOWN = ("controller", "sensor", "figures", "expect", "knob")
-HOW = "give its scenario with --scenario (in Python: scenario=...)"
+HOW = "in Python, its scene can be given: result.view(scene=...)"
 
 
 class Replay:
@@ -28,8 +28,8 @@ class Replay:
 
     `result` is a Result or the path of one that was saved. The scene and its visual model are
     built from the settings of the run, and the robots and surfaces that the result holds; no other
-    file is read, but those of this package and of example-robot-data. `scenario`, a shipped name or
-    a path, takes their place. A Result of one's own scene has that scene.
+    file is read, but those of this package and of example-robot-data. A Result of one's own scene
+    has that scene.
 
     No code that a scenario names, a xacro file or a Python routine, is executed, as the recorded
     contacts need none: a file of results may be somebody else's. A pair of `scene` whose contacts a
@@ -38,22 +38,18 @@ class Replay:
     Raises
     ------
     ResultError
-        It is unknown which scene ran, or the scenario's robot or contacts are not those of the run.
-    SphshellError
-        The result cannot be read, or `scenario` cannot be built.
+        The result cannot be read, it is unknown which scene ran, or the scene's robot or contacts
+        are not those of the run.
     """
 
-    def __init__(
-        self,
-        result: Result | str | PathLike[str],
-        scenario: str | PathLike[str] | None = None,
-    ) -> None:
+    def __init__(self, result: Result | str | PathLike[str]) -> None:
         self.result = result if isinstance(result, Result) else Result.load(result)
         self._name = "the result" if isinstance(result, Result) else str(Path(result))
         with warnings.catch_warnings():
             # What stands in for a law's function is one of Python.
             warnings.simplefilter("ignore", SlowLawWarning)
-            built = self._build(scenario)
+            origin = self.result.origin
+            built = None if origin is None else _build_again(origin, self._name)
         self.speed = 1.0
         """Seconds of simulated time that a recording of it shows in one second."""
         if built is not None:
@@ -67,15 +63,6 @@ class Replay:
         else:
             raise ResultError(self._name, f"does not say which scene it came from: {HOW}")
         self._check()
-
-    def _build(self, scenario: str | PathLike[str] | None) -> Built | None:
-        if scenario is not None:
-            path = find_scenario(scenario)
-            shown = _shown(read_scenario(path))
-            _check_without_code(shown, path)
-            return build_scenario(shown, path, function=unloaded)
-        origin = self.result.origin
-        return None if origin is None else _build_again(origin, self._name)
 
     def _check(self) -> None:
         """Refuse a scene in which these rows mean nothing."""
@@ -92,27 +79,10 @@ class Replay:
                     )
 
 
-def _shown(scenario: Scenario) -> Scenario:
-    """Return what of `scenario` is needed to show it."""
-    given = scenario.model_dump(exclude_unset=True)
-    return Scenario.model_validate({k: v for k, v in given.items() if k not in UNSHOWN})
-
-
-def _check_without_code(scenario: Scenario, path: Path) -> None:
-    """Refuse a xacro file, whose expressions are Python's."""
-    for one in scenario.robot:
-        if Path(one.path or "").suffix.lower() == ".xacro":
-            raise SphshellError(
-                f"{path}: the robot '{one.path}' is not read, as a xacro file is code, and no code "
-                "is executed to show a finished run: run the scenario again"
-            )
-
-
 def _build_again(origin: Origin, name: str) -> Built:
     """Build the scene of `origin` from what is kept with it; `name` is the result's."""
     if origin.keep is None:
-        why = "an earlier version saved it without its robots and surfaces: run it again, or "
-        raise ResultError(name, f"{why}{HOW}")
+        raise ResultError(name, f"was saved without its robots and surfaces: {HOW}")
     path = Path(origin.scenario)
     if path.suffix != ".toml":
         path = shipped_scenarios().get(origin.scenario, path)

@@ -38,13 +38,12 @@ def check_robot(
     """Check contact on a robot: a name that sphshell_pin.robots knows, a file, or a model.
 
     A sphere of `radius` [m] sits at `frame`; without them it is a fingertip or foot that is known,
-    else the outermost of the spheres inside the collision mesh at the end of the longest limb, or
-    that end. A file is a URDF, xacro (`xacro_args` are its arguments) or MJCF; `free_flyer` frees
-    the root link of a URDF, `package_dirs` are the folders that hold packages that it includes.
-    `density` [kg/m^3] gives links of a URDF the mass of their geometry where it states none. Mimic
-    joints are exact unless `mimic` is False. Other meshes are not loaded. The same `seed` gives the
-    same postures; `sizes` says how many; `progress` is called with the key of each check before it
-    starts. A model is a pinocchio.Model.
+    else the end of the longest limb. A file is a URDF, xacro (`xacro_args` are its arguments) or
+    MJCF; `free_flyer` frees the root link of a URDF, `package_dirs` are the folders that hold
+    packages that it includes. `density` [kg/m^3] gives links of a URDF the mass of their geometry
+    where it states none. Mimic joints are exact unless `mimic` is False. Meshes are not loaded. The
+    same `seed` gives the same postures; `sizes` says how many; `progress` is called with the key of
+    each check before it starts. A model is a pinocchio.Model.
 
     A robot that cannot be loaded on this machine, or whose sphere nothing can move, is reported as
     not checked, with the reason.

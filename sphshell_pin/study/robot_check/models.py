@@ -24,8 +24,6 @@ class Subject:
     shipped: str | None
     """The name under which sphshell_pin.robots knows it, or None."""
     notes: tuple[str, ...] = field(default=())
-    spheres_of: Callable[[str], robots.MeshSpheres] | None = None
-    """Approximates the collision geometry of a link, by its name; None where there is none."""
 
 
 def all_names() -> list[str]:
@@ -140,14 +138,7 @@ def _without_meshes(
         name, model, spheres, pin.GeometryModel(), q0, description=description
     )
     robot = robots.exactly(robot, description, mimic=mimic, warn=False)
-
-    def spheres_of(link: str) -> robots.MeshSpheres:
-        part = copy.deepcopy(description)
-        robots.keep_geometry_of(part, {link})
-        geometry, _ = robots.build_geometry(part, model, pin.GeometryType.COLLISION)
-        return robots.spheres_of_link(model, geometry, link, count=8)
-
-    return Subject(name, robot, shipped, robot.notes, spheres_of)
+    return Subject(name, robot, shipped, robot.notes)
 
 
 def listed(names: list[str], most: int = 4) -> str:

@@ -1,7 +1,5 @@
 """Where the sphere of a check sits: a fingertip that is known, or the end of the longest limb."""
 
-from dataclasses import replace
-
 import numpy as np
 import pinocchio as pin
 
@@ -52,45 +50,8 @@ def find_sphere(
             return tip, []
         break
     end = _longest_limb(model)
-    if radius is None:
-        on_mesh = _on_mesh(subject, model, end, why)
-        if on_mesh is not None:
-            # In a wheel it is as large as the circle on which its center moves.
-            most = _lever(model, _sphere(on_mesh), rng) / _FEWEST
-            small = replace(on_mesh, radius=most) if 0.0 < most < on_mesh.radius else on_mesh
-            return small, [small.source]
     said = f"{why}: the sphere sits at '{end}', the end of the longest limb"
     return Tip(end, radius or size, np.zeros(3), said), [said]
-
-
-def _on_mesh(subject: Subject, model: pin.Model, end: str, why: str) -> Tip | None:
-    """Return the outermost sphere of those inside the collision meshes on the body of `end`.
-
-    None where it has no closed mesh, or where that cannot be read.
-    """
-    if subject.spheres_of is None:
-        return None
-    joint = model.frames[find_frame(model, end)].parentJoint
-    best, reach = None, 0.0
-    for frame in model.frames:
-        if frame.parentJoint != joint or frame.type != pin.FrameType.BODY:
-            continue
-        try:
-            made = subject.spheres_of(frame.name)
-        except SphshellError:
-            continue
-        least = max(_DUMMY, 0.25 * max(one.radius for one in made.spheres))
-        for one in made.spheres:
-            out = np.linalg.norm(frame.placement.act(np.array(one.offset)))
-            far = round(float(out) + one.radius, 9)  # of two fingers that are alike the first
-            if one.radius >= least and far > reach:
-                said = (
-                    f"{why}: the sphere is the outermost of {len(made.spheres)} inside the "
-                    f"collision mesh of '{frame.name}', which is nowhere farther than "
-                    f"{made.mesh_to_spheres * 1e3:.3g} mm from them"
-                )
-                best, reach = Tip(frame.name, one.radius, np.array(one.offset), said), far
-    return best
 
 
 def _sphere(tip: Tip, shift: Array | float = 0.0) -> Sphere:
