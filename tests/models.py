@@ -52,16 +52,7 @@ def empty(gravity: float = 9.81) -> pin.Model:
     return model
 
 
-def add_body(
-    model: pin.Model,
-    name: str,
-    joint: pin.JointModel,
-    parent: int = 0,
-    *,
-    placement: pin.SE3 | None = None,
-    inertia: pin.Inertia | None = None,
-    frame: pin.SE3 | None = None,
-) -> int:
+def add_body(model, name, joint, parent=0, *, placement=None, inertia=None, frame=None) -> int:
     """Add a body on `joint` with a frame called `name` on it; return the joint's index."""
     here = pin.SE3.Identity()
     index = model.addJoint(parent, joint, placement or here, f"{name}_joint")
@@ -71,12 +62,7 @@ def add_body(
     return int(index)
 
 
-def ball(
-    gravity: float = 9.81,
-    mass: float = 1.0,
-    radius: float = 0.05,
-    joint: pin.JointModel | None = None,
-) -> pin.Model:
+def ball(gravity=9.81, mass=1.0, radius=0.05, joint=None) -> pin.Model:
     """Ball whose center is the frame "ball"; free unless a joint is given."""
     model = empty(gravity)
     inertia = pin.Inertia.FromSphere(mass, radius)
@@ -89,9 +75,7 @@ def slider(gravity: float = 9.81, mass: float = 1.0) -> pin.Model:
     return ball(gravity, mass, joint=pin.JointModelPZ())
 
 
-def block(
-    gravity: float = 9.81, mass: float = 1.0, radius: float = 0.05, *, tilt: float = 0.0
-) -> pin.Model:
+def block(gravity=9.81, mass=1.0, radius=0.05, *, tilt=0.0) -> pin.Model:
     """Ball that slides without turning, q its center; gravity leans by `tilt` [rad] along x."""
     model = ball(gravity, mass, radius, pin.JointModelTranslation())
     model.gravity.linear = gravity * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
@@ -130,9 +114,7 @@ def linear_law(stiffness: float, damping: float = 0.0) -> ImpactLaw:
     return ImpactLaw(stiffness, 1.0, damping, 1e-6)
 
 
-def on_shell(  # type: ignore[no-untyped-def]
-    model: pin.Model, shell, law, friction=None, *, radius: float = 0.05, offset=(0, 0, 0), **more
-) -> Scene:
+def on_shell(model, shell, law, friction=None, *, radius=0.05, offset=(0, 0, 0), **more) -> Scene:
     """Scene of a sphere at the frame "ball" and a shell, a fixed one unless `more` has a frame."""
     scene = Scene(model)
     more = {"name": "ball", **more}

@@ -1,7 +1,9 @@
 """Runs whose sensitivities are compared with differences of whole runs."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -30,34 +32,29 @@ BRISTLE = sp.BristleFriction(0.4, 0.3, 2e4, 20.0, 0.05)
 PAIR = "ball-plate"
 
 
+@dataclass
 class Case:
     """A scene, where it starts, and how it is run; its sensitivities and those by differences."""
 
-    def __init__(
-        self,
-        scene: sp.Scene,
-        q0: Sequence[float] | Array,
-        v0: Sequence[float] | Array,
-        duration: float,
-        integrator: object = ADAPTIVE,
-        *,
-        record_dt: float | None = None,
-        controller: object = None,
-        control_dt: float | None = None,
-    ) -> None:
-        self.scene, self.duration, self.integrator = scene, duration, integrator
-        self.q0, self.v0 = np.array(q0, dtype=float), np.array(v0, dtype=float)
-        self.options = {"record_dt": record_dt or duration / 8}
-        self.options |= {"controller": controller, "control_dt": control_dt}
+    scene: sp.Scene
+    q0: Any
+    v0: Any
+    duration: float
+    integrator: Any = ADAPTIVE
+    record_dt: float | None = None
+    controller: Any = None
+    control_dt: float | None = None
+
+    def __post_init__(self):
+        self.q0, self.v0 = (np.array(one, dtype=float) for one in (self.q0, self.v0))
+        self.options = {"controller": self.controller, "control_dt": self.control_dt}
+        self.options["record_dt"] = self.record_dt or self.duration / 8
 
     def run(self, scene=None, q0=None, v0=None, names=None):
-        asked = {} if names is None else {"sensitivities": names}
-        return sp.Simulation(scene or self.scene, self.integrator).run(  # type: ignore[arg-type]
-            self.q0 if q0 is None else q0,
-            self.v0 if v0 is None else v0,
-            self.duration,
-            **self.options,
-            **asked,  # type: ignore[arg-type]
+        asked = self.options if names is None else {**self.options, "sensitivities": names}
+        start = self.q0 if q0 is None else q0, self.v0 if v0 is None else v0
+        return sp.Simulation(scene or self.scene, self.integrator).run(
+            *start, self.duration, **asked
         )
 
     def columns(self, names: Sequence[str]) -> list[str]:
@@ -157,14 +154,7 @@ def drop(law, integrator=ADAPTIVE, *, gap=0.01, speed=0.5, duration=0.1, gravity
 
 
 def thrown(
-    law: sp.NormalLaw,
-    friction: sp.CoulombFriction | sp.BristleFriction | sp.MindlinFriction | None,
-    integrator: object = ADAPTIVE,
-    *,
-    shell: sp.Shell | None = None,
-    method: str = "smooth",
-    duration: float = 0.06,
-    gap: float = 0.01,
+    law, friction, integrator=ADAPTIVE, *, shell=None, method="smooth", duration=0.06, gap=0.01
 ) -> Case:
     """A free, spinning ball that meets a plate at an angle."""
     shell = models.plate(4.0) if shell is None else shell

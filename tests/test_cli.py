@@ -88,12 +88,8 @@ def test_a_faulty_scenario_and_debug(tmp_path):
     assert type(call("--debug", "run", path).exception).__name__ == "ScenarioError"
 
 
-OWN = """
-import numpy as np
-
-def tau(t, q, v, contacts):
+OWN = """def tau(t, q, v, contacts):
     raise RuntimeError("no torque")
-
 def find(pose_i, pose_j):
     raise RuntimeError("no teeth")
 """
@@ -108,7 +104,7 @@ def test_a_fault_of_the_users_routine_says_whose_it_is(run, tmp_path):
     source = '[[source]]\nname = "gears"\nfind = "own.py:find"\nframe_i = "ball"\n'
     told = refused(*run(DROP.replace("[run]", f'{source}law.type = "adams"\n[run]')))
     assert "RuntimeError: no teeth, raised by contact source 'gears' with" in told
-    assert "(own.py:find, line 8)" in told
+    assert "(own.py:find, line 4)" in told
 
 
 def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(run, tmp_path):

@@ -3,12 +3,8 @@
 from pathlib import Path
 
 
-def inertial(
-    mass: float = 1.0,
-    moment: float | tuple[float, float, float] = 1.0,
-    at: tuple[float, float, float] = (0, 0, 0),
-) -> str:
-    """Mass, the moments of inertia about its center of mass, and where that is."""
+def inertial(mass=1.0, moment=1.0, at=(0, 0, 0)) -> str:
+    """Mass, the moments of inertia about its center of mass, one or three, and where that is."""
     x, y, z = moment if isinstance(moment, tuple) else (moment,) * 3
     origin = f'<origin xyz="{at[0]:g} {at[1]:g} {at[2]:g}"/>' if any(at) else ""
     return (
@@ -30,16 +26,7 @@ def link(name: str, *parts: str) -> str:
     return f'<link name="{name}">{"".join(parts)}</link>'
 
 
-def joint(
-    name: str,
-    kind: str,
-    parent: str,
-    child: str,
-    *more: str,
-    at: str = "0 0 0",
-    axis: str = "0 1 0",
-    rpy: str = "0 0 0",
-) -> str:
+def joint(name, kind, parent, child, *more, at="0 0 0", axis="0 1 0", rpy="0 0 0") -> str:
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'<origin xyz="{at}" rpy="{rpy}"/><axis xyz="{axis}"/>'

@@ -80,11 +80,10 @@ def mesh_corpus() -> tuple[bytes, ...]:
     uri = "data:application/octet-stream;base64," + b64encode(buffer).decode()
     accessor = {"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3"}
     indices = {"bufferView": 1, "componentType": 5123, "count": 21, "type": "SCALAR"}
-    mesh = {"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}
     gltf = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
     gltf |= {
         "nodes": [{"mesh": 0}],
-        "meshes": [mesh],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "accessors": [{**accessor, "min": [0, 0, 0], "max": [1, 1, 1]}, indices],
         "bufferViews": [
             {"buffer": 0, "byteOffset": start, "byteLength": length}

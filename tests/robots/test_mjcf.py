@@ -133,6 +133,16 @@ def test_equalities_of_joints_are_mimic_joints():
     assert np.allclose(limits, 0.5 * (0.1 + 1.2 * np.deg2rad([-10, 80])), rtol=1e-12)
 
 
+def test_equalities_hold_between_distances_from_the_reference(tmp_path):
+    """j1 - 0.2 = 0.1 + 0.5 (j2 - 0.3), of which j1 is the coordinate."""
+    joints = ARM.replace('"j1"', '"j1" ref="0.2"').replace('"j2"', '"j2" ref="0.3"')
+    path = written(tmp_path, joints, '<compiler angle="radian"/>')
+    end = '<equality><joint joint1="j1" joint2="j2" polycoef="0.1 0.5"/></equality></mujoco>'
+    path.write_text(path.read_text().replace("</mujoco>", end))
+    (rule,) = mimics(robots.load_file(path, mimic=True).model).values()
+    assert (rule.ratio, rule.offset) == pytest.approx((2.0, -2.0 * (0.2 + 0.1 - 0.5 * 0.3)))
+
+
 def test_keys_are_poses_and_without_one_it_starts_as_drawn():
     stand = [0, 0, 0.3, 0, 0, 0, 1, 0.5, -1, 0.5, -1, -0.5, 0, -1]
     assert np.allclose(load("quadruped.xml", pose="stand").q0, stand)

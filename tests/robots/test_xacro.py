@@ -86,10 +86,9 @@ def xacro(tmp_path, inside):
 def test_xacro_expressions_compute_and_do_nothing_else(how, tmp_path):
     made = tmp_path / "made"
     expression = escape(HOSTILE[how].replace("FILE", str(made)), {"'": "&apos;", '"': "&quot;"})
-    links = "<link name='a'/><link name='${p}'/>"
     values = {"p": expression, "f1": "{0.real}", "f2": "{0[0]}", "f3": "{:99999999999}"}
     given = "".join(f"<xacro:property name='{k}' value='{v}'/>" for k, v in values.items())
-    path = xacro(tmp_path, given + links)
+    path = xacro(tmp_path, given + "<link name='a'/><link name='${p}'/>")
     # What is in $(eval ...) ends at the first parenthesis, and is no expression then.
     said = "refused in the expression|too deeply|is not defined"
     with pytest.raises(robots.RobotError, match=said if "${" in expression else "cannot expand"):

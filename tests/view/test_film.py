@@ -86,7 +86,7 @@ def test_ctrl_c_leaves_nothing(rendered, tmp_path, keyboard):
         ("run.avi", {}, r"run\.avi' must end in \.png or \.mp4"),
         ("run.png", {"time": 3.5}, "time = 3.5 must be in the run: 0 to 3 s"),
         ("run.mp4", {"span": (-1.0, None)}, "span = -1.0 must be in the run"),
-        ("run.mp4", {"span": (2.0, 1.0)}, "span = '2 to 1 s' must end after it begins"),
+        ("run.mp4", {"span": (2.0, 2.0)}, "span = '2 to 2 s' must end after it begins"),
         ("run.mp4", {"time": 1.0}, "time = 1.0 is for a .png"),
         ("run.png", {"speed": 5.0}, "speed = 5.0 is for a film"),
         ("run.mp4", {"fps": 0}, "fps = 0 must be positive"),

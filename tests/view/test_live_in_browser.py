@@ -1,5 +1,6 @@
 """The live page in a real browser: pixels, clicks, keys, sliders, several tabs, no network."""
 
+import re
 from urllib.parse import urljoin
 
 import numpy as np
@@ -9,6 +10,7 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.arrows import NORMAL_COLOR
 from sphshell_pin.view.live import Live
+from tests.scenario.files import FINGER, write
 from tests.view.live_player import BallPlayer
 from tests.view.test_recording_in_browser import count, is_blue, is_greenish, pixels_of, watch
 
@@ -165,3 +167,41 @@ def test_contacts_of_a_hand_have_names_that_differ(opened):
         "names => import('./contacts.js').then(it => names.map(one => it.shorten(one, names)))"
     )
     assert tab.page.evaluate(shorten, names) == links + rest
+
+
+def test_quantities_and_their_curves_can_be_chosen(opened, tmp_path):
+    # Its motion as stated is never over: Reset does not become Repeat, which would set it going.
+    path = write(tmp_path, re.sub(r"duration = .*", "duration = 100.0", FINGER))
+    live, tab = opened(LiveRun(build(path)), running=False)
+    tab.wait("chart.run.keys.length")
+    offered = ["Force [N]", "Depth [mm]", "Joint position [deg]", "Joint velocity [deg/s]"]
+    offered += ["Controller torque [N m]", "Sensor wrist [N]", "Sensor wrist [N m]"]
+    offered += ["Energy residual [J]"]
+    assert tab.page.locator("#quantity option").all_inner_texts() == offered
+    assert tab.page.evaluate("chart.run.keys") == ["normal", "friction"]
+    tab.page.evaluate("document.getElementById('step-size').value = '0.1'")
+    tab.click("#step")
+    tab.wait("state.t > 0.05")
+    # Chosen after the step: what was recorded is shown all the same.
+    tab.page.select_option("#quantity", "Joint position [deg]")
+    tab.wait("chart.curves.every((one) => chart.run.keys.includes(one.key))")
+    assert tab.page.evaluate("chart.run.keys") == ["q.knuckle", "q.middle_joint", "q.distal_joint"]
+    t, angle = tab.page.evaluate("chart.run.rows[0].slice(0, 2)")
+    assert t < 0.02
+    assert angle == pytest.approx(np.rad2deg(0.3), abs=1.0)
+    tab.page.locator("#curves summary").click()
+    boxes = tab.page.locator("#curve-list label")
+    assert boxes.all_inner_texts() == ["knuckle", "middle_joint", "distal_joint"]
+    boxes.nth(1).click()
+    tab.wait("chart.run.keys.length === 2")
+    assert tab.page.locator("#curve-legend .key").all_inner_texts() == ["knuckle", "distal_joint"]
+    # As many are computed as one of the pages shows.
+    assert live._charts.keys == ("q.knuckle", "q.distal_joint")
+    tab.page.locator("h1").click()
+    assert not tab.page.locator("#curve-list").is_visible()
+    # Both runs are compared at the same simulated time.
+    rows = "run => chart[run].rows.map((row) => row.slice(0, 2))"
+    before = tab.page.evaluate(rows, "run")
+    tab.click("#reset")
+    tab.wait("state.t === 0 && chart.ghost")
+    assert tab.page.evaluate(rows, "ghost") == before
