@@ -51,6 +51,7 @@ def test_without_a_robot_such_tests_are_skipped_with_the_reason(suite: pytest.Py
 def test_scenes_and_assertions(suite: pytest.Pytester) -> None:
     suite.makepyfile(
         """
+        import pinocchio as pin
         from sphshell_pin.testing import assert_derivatives, assert_forces_balance
 
         def test_named(contact_scene_factory):
@@ -62,9 +63,17 @@ def test_scenes_and_assertions(suite: pytest.Pytester) -> None:
         def test_gap(contact_scene_factory):
             touch = contact_scene_factory("ball", depth=-0.5)
             assert len(touch.scene.contacts(touch.q)) == 0
+
+        def test_own_model(contact_scene_factory):
+            model = pin.Model()
+            joint = model.addJoint(0, pin.JointModelPlanar(), pin.SE3.Identity(), "slide")
+            model.appendBodyToJoint(joint, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+            model.addBodyFrame("puck", joint, pin.SE3.Identity(), 0)
+            touch = contact_scene_factory(model, frame="puck", radius=0.1)
+            assert_forces_balance(touch.scene, touch.q, touch.v)
         """
     )
-    suite.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=2)
+    suite.runpytest_inprocess(*PLUGIN).assert_outcomes(passed=3)
 
 
 def test_broken_scenes_fail(suite: pytest.Pytester) -> None:
