@@ -6,6 +6,7 @@ corners. The integrals are adaptive, as the force has kinks where contacts come 
 
 import itertools
 from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -42,22 +43,13 @@ SURFACES = {
 KINDS = {"faces": {}, "curved": {"faces": False}, "flat": {"faces": False, "crease_angle": 0.0}}
 
 
-@pytest.fixture(scope="module")
-def shells() -> Callable[[str, str], sp.Shell]:
-    made: dict[tuple[str, str], sp.Shell] = {}
-
-    def shell(name: str, kind: str) -> sp.Shell:
-        if (name, kind) not in made:
-            more = {"scale": "ignore"} if name.endswith(".shl") else {}
-            if kind == "faces":
-                one = sp.Shell.from_file(FOLDER / name, unit=SURFACES[name][0], **more)
-            else:
-                whole = shell(name, "faces")
-                one = sp.Shell(whole.vertices, whole.elements, side=whole.side, **KINDS[kind])
-            made[name, kind] = one
-        return made[name, kind]
-
-    return shell
+@cache
+def shell_of(name: str, kind: str) -> sp.Shell:
+    more = {"scale": "ignore"} if name.endswith(".shl") else {}
+    if kind == "faces":
+        return sp.Shell.from_file(FOLDER / name, unit=SURFACES[name][0], **more)
+    whole = shell_of(name, "faces")
+    return sp.Shell(whole.vertices, whole.elements, side=whole.side, **KINDS[kind])
 
 
 def triangle(shell: sp.Shell, radius: float, rng: np.random.Generator) -> np.ndarray:
@@ -72,13 +64,8 @@ def triangle(shell: sp.Shell, radius: float, rng: np.random.Generator) -> np.nda
     east /= np.linalg.norm(east)
     north, length = np.cross(normal, east), rng.uniform(0.2, 1.0) * radius
     lifts = 0.006 * radius * rng.normal(size=2)
-    return np.array(
-        [
-            start,
-            start + length * east + lifts[0] * normal,
-            start + 0.7 * length * (east + north) + lifts[1] * normal,
-        ]
-    )
+    far = start + 0.7 * length * (east + north) + lifts[1] * normal
+    return np.array([start, start + length * east + lifts[0] * normal, far])
 
 
 def work_around(work: Callable[[np.ndarray, np.ndarray], float], corners: np.ndarray) -> float:
@@ -86,15 +73,9 @@ def work_around(work: Callable[[np.ndarray, np.ndarray], float], corners: np.nda
     total = 0.0
     for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
         # In eight parts, so that a contact of a moment is not overlooked.
-        cuts = np.linspace(0, 1, 9)
-        for one in itertools.pairwise(cuts):
-            total += quad(
-                lambda u, a=a, b=b: work(a + u * (b - a), b - a),
-                *one,
-                limit=100,
-                epsabs=1e-12,
-                epsrel=1e-7,
-            )[0]
+        for one in itertools.pairwise(np.linspace(0, 1, 9)):
+            side = partial(lambda a, way, u: work(a + u * way, way), a, b - a)
+            total += quad(side, *one, limit=100, epsabs=1e-12, epsrel=1e-7)[0]
     return total
 
 
@@ -129,13 +110,13 @@ def worst_loop(shell: sp.Shell, radius: float, law, loops: int, method: str | No
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", SURFACES)
-def test_no_work_is_done_around_a_loop(name, kind, law, loops, bound, shells) -> None:
+def test_no_work_is_done_around_a_loop(name, kind, law, loops, bound) -> None:
     radius = SURFACES[name][1]
-    assert worst_loop(shells(name, kind), radius, LAWS[law](radius), loops) < bound
+    assert worst_loop(shell_of(name, kind), radius, LAWS[law](radius), loops) < bound
 
 
 @pytest.mark.parametrize("name", SURFACES)
-def test_no_work_is_done_by_a_foundation_on_facets(name: str, shells) -> None:
+def test_no_work_is_done_by_a_foundation_on_facets(name: str) -> None:
     radius = SURFACES[name][1]
     law = LAWS["foundation"](radius)
-    assert worst_loop(shells(name, "faces"), radius, law, 1, "facets") < 1e-6
+    assert worst_loop(shell_of(name, "faces"), radius, law, 1, "facets") < 1e-6

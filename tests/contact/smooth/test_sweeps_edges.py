@@ -1,6 +1,7 @@
 """A sphere is swept over curved creases, borders and vertices: its force does not jump."""
 
-from functools import cache
+from functools import cache, partial
+from itertools import product
 
 import numpy as np
 import pytest
@@ -30,50 +31,48 @@ def lens(half: float, rows: int, columns: int):
     return vertices, triangles, (at + np.where(above, [0, 0, drop], [0, 0, -drop])) / 4
 
 
-def curved_sheet(name: str):
-    """Open sheets with curved borders: vertices, elements, normals."""
-    if name == "cap":
-        vertices, elements = meshes.dome(8, size=4.0, radius=4.0)
-        return vertices, elements, (vertices + [0.0, 0.0, 4.0]) / 4
-    if name == "gutter":
-        flat, elements = meshes.random_plate(200, seed=3, size=4.0, slivers=False)
-        x, y, _ = flat.T
-        normals = np.stack([np.sin(x / 3), 0 * x, np.cos(x / 3)], axis=1)
-        return 3 * normals + np.stack([0 * x, y, 0 * x - 3], axis=1), elements, normals
-    return SURFACES[{"tube": "cylinder outside", "wave": "wavy above"}[name]].mesh(0.6)
+def open_cap():
+    vertices, elements = meshes.dome(8, size=4.0, radius=4.0)
+    return vertices, elements, (vertices + [0.0, 0.0, 4.0]) / 4
+
+
+def gutter():
+    flat, elements = meshes.random_plate(200, seed=3, size=4.0, slivers=False)
+    x, y, _ = flat.T
+    normals = np.stack([np.sin(x / 3), 0 * x, np.cos(x / 3)], axis=1)
+    return 3 * normals + np.stack([0 * x, y, 0 * x - 3], axis=1), elements, normals
+
+
+def larger(mesh):
+    return 4 * mesh[0], mesh[1]
+
+
+# Shells with borders and true edges: vertices, elements and the exact normals, if there are any;
+# the side, and the angle of a crease [deg].
+EDGES = {
+    "can": (can, "outside", 30),
+    "cup": (can, "inside", 30),
+    "lens": (lambda: lens(1.6, 4, 24), "outside", 12),
+    "inside a lens": (lambda: lens(3.95, 14, 64), "inside", 12),
+    "tube": (lambda: SURFACES["cylinder outside"].mesh(0.6), "both", 30),
+    "cap": (open_cap, "both", 30),
+    "wave": (lambda: SURFACES["wavy above"].mesh(0.6), "both", 30),
+    "gutter": (gutter, "both", 30),
+    "sheet": (lambda: meshes.grid_plate(3, 3, size=4.0), "both", 30),
+    "l plate": (lambda: larger(meshes.l_plate(2)), "both", 30),
+    "cube": (lambda: meshes.cube(4.0), "outside", 30),
+    "box": (lambda: meshes.cube(4.0), "inside", 30),
+    "cone": (lambda: larger(cone(40, 0.8, 3)), "both", 30),
+}
 
 
 @cache
 def edged(kind: str, exact: bool = True) -> Shell:
-    """Shells with borders and true edges, with exact normals or estimated ones."""
-    if kind in ("can", "cup"):
-        vertices, elements, normals = can()
-        side, crease = {"can": "outside", "cup": "inside"}[kind], 30.0
-    elif kind in ("lens", "inside a lens"):
-        half, rows, columns = (1.6, 4, 24) if kind == "lens" else (3.95, 14, 64)
-        vertices, elements, normals = lens(half, rows, columns)
-        side, crease = ("outside" if kind == "lens" else "inside"), 12.0
-    elif kind in ("tube", "cap", "wave", "gutter"):
-        vertices, elements, normals = curved_sheet(kind)
-        side, crease = "both", 30.0
-    else:
-        vertices, elements = {
-            "sheet": lambda: meshes.grid_plate(3, 3, size=4.0),
-            "l plate": lambda: meshes.l_plate(2),
-            "cube": lambda: meshes.cube(4.0),
-            "box": lambda: meshes.cube(4.0),
-            "cone": lambda: cone(40, 0.8, 3),
-        }[kind]()
-        if kind in ("l plate", "cone"):
-            vertices = 4 * vertices
-        side, crease, exact = {"cube": "outside", "box": "inside"}.get(kind, "both"), 30.0, False
-    return Shell(
-        vertices,
-        elements,
-        normals=normals if exact else None,
-        crease_angle=np.radians(crease),
-        side=side,
-    )
+    """One of them, with exact normals or estimated ones."""
+    make, side, crease = EDGES[kind]
+    vertices, elements, *normals = make()
+    given = normals[0] if exact and normals else None
+    return Shell(vertices, elements, normals=given, crease_angle=np.radians(crease), side=side)
 
 
 def deepest(shell, center) -> float:
@@ -85,23 +84,17 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
     rng = np.random.default_rng(seed)
     sign = {"both": 0, "outside": 1, "inside": -1}[shell.side]
     edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
-    inner = shell.vertices.mean(axis=0)
+    inner, low, high = shell.vertices.mean(axis=0), 0.7, 1.8
     while count:
         a, b = shell.vertices[rng.choice(edges)]
         place = a + rng.choice([0.0, rng.uniform(), 1.0]) * (b - a)
         out = directions(rng)
         if sign * out @ (place - inner) < 0:
             out = -out
-        low, high = 0.7, 1.8
         if not deepest(shell, place + low * out) > depth > deepest(shell, place + high * out):
             continue
-        out *= brentq(
-            lambda s, at, along: deepest(shell, at + s * along) - depth,
-            low,
-            high,
-            (place, out),
-            1e-10,
-        )
+        more = partial(lambda at, way, s: deepest(shell, at + s * way) - depth, place, out)
+        out *= brentq(more, low, high, xtol=1e-10)
         along = reach * directions(rng)
         path = sweeps.segment(place + out - along, place + out + along, 9)
         # At the surface itself no normal is defined, and behind it a one-sided shell pushes back.
@@ -111,11 +104,8 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
             yield path
 
 
-EDGED = [
-    (kind, exact)
-    for kind in ("can", "cup", "lens", "inside a lens", "tube", "cap", "wave", "gutter")
-    for exact in (True, False)
-] + [(kind, False) for kind in ("sheet", "l plate", "cube", "box", "cone")]
+CURVED = list(EDGES)[:8]
+EDGED = [(kind, exact) for kind in EDGES for exact in (True, False) if kind in CURVED or not exact]
 SOME_EDGED = {("can", True), ("wave", True), ("tube", True)}
 SOME_EDGED |= {(kind, False) for kind in ("can", "cup", "lens", "sheet", "box", "cone")}
 EDGED = mostly_studies(EDGED, SOME_EDGED.__contains__)
@@ -168,16 +158,12 @@ def over_vertex(shell, depth: float):
 
 
 STARS = [
-    (kind, facets, slope)
-    for kind in ("tip", "pit", "saddle")
-    for facets in (3, 4, 6, 12)
-    for slope in (2, 10, 40)
-    if (kind, facets) != ("saddle", 3)
+    one
+    for one in product(("tip", "pit", "saddle"), (3, 4, 6, 12), (2, 10, 40))
+    if one[:2] != ("saddle", 3)
 ]
-SOME_STARS = {
-    *(("tip", 3, 10), ("tip", 12, 40), ("pit", 6, 2), ("pit", 12, 40)),
-    *(("saddle", 4, 2), ("saddle", 6, 40)),
-}
+SOME_STARS = {("tip", 3, 10), ("tip", 12, 40), ("pit", 6, 2), ("pit", 12, 40)}
+SOME_STARS |= {("saddle", 4, 2), ("saddle", 6, 40)}
 SMOOTH_STARS = mostly_studies((s for s in STARS if s[2] <= 10), SOME_STARS.__contains__)
 STARS = mostly_studies(STARS, SOME_STARS.__contains__)
 

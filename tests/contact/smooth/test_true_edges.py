@@ -40,18 +40,11 @@ def test_cone_tip(slope: float, rings: int) -> None:
             assert contacts.feature[0] == Feature.VERTEX
 
 
-def octahedron():
-    vertices = np.concatenate([np.eye(3), -np.eye(3)]) / 2.0
-    faces = [(0, 1, 2), (1, 3, 2), (3, 4, 2), (4, 0, 2), (1, 0, 5), (3, 1, 5), (4, 3, 5), (0, 4, 5)]
-    return vertices, np.array(faces)
-
-
 POLYHEDRA = {
     "cube": (meshes.cube(), None),
     "cube of quads": (meshes.cube(quads=True), None),
     "sheet": (meshes.grid_plate(3, 5), None),
     "tetrahedron": (tetrahedron(0.9), None),
-    "octahedron": (octahedron(), None),
     "icosahedron": (meshes.icosphere(0), None),
     "l plate": (meshes.l_plate(3), None),
     "book": (meshes.fan(5, seed=1), 0.0),
