@@ -9,8 +9,11 @@ from sphshell_pin._interrupts import interrupts_delayed
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-with interrupts_delayed():
-    from sphshell_pin import _versions as _versions  # loads the core: Pinocchio and Coal first
+with interrupts_delayed():  # Pinocchio and Coal load first, then the core
+    from sphshell_pin._versions import __version__ as __version__
+
+from sphshell_pin.base import upward
+from sphshell_pin.upper_layers import UpperLayers
 
 if TYPE_CHECKING:
     from sphshell_pin import results as results
@@ -27,7 +30,7 @@ if TYPE_CHECKING:
     from sphshell_pin.study.fit import Experiment as Experiment
     from sphshell_pin.study.fit import fit as fit
 
-__version__ = "0.3.0.dev0"  # what is released next; the only place
+upward.layers = UpperLayers()
 
 _PARTS = (
     "contact",

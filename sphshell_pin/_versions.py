@@ -1,4 +1,4 @@
-"""Loads the C++ core, after a check that it meets the libraries it was compiled against.
+"""The version; loads the C++ core, which is checked against the libraries it was compiled for.
 
 Pinocchio and Coal come first: the core finds their shared objects, and their Python types, loaded.
 Their shared objects carry no version in their names, so the core would load with any of them, and
@@ -10,6 +10,8 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+
+__version__ = "0.3.0.dev0"  # what is released next; the only place
 
 # What to import, its distribution on PyPI.
 _LIBRARIES = (("pinocchio", "pin"), ("coal", "coal"))

@@ -99,6 +99,11 @@ def block(
     return model
 
 
+def run(scene: Scene, integrator, q, v=None, duration=0.1, **more) -> sp.Result:  # type: ignore[no-untyped-def]
+    """Run a scene from rest, unless a velocity is given."""
+    return sp.Simulation(scene, integrator).run(q, v, duration, **more)
+
+
 def free_q(position: Vector) -> Vector:
     """Configuration of a free-flyer at `position`, unturned."""
     return np.concatenate([np.asarray(position, dtype=float), [0.0, 0.0, 0.0, 1.0]])

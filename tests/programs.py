@@ -23,3 +23,10 @@ def module_of(file: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+# Processes that run in the background pass on that Ctrl-C is to be ignored.
+HEARS_CTRL_C = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from sphshell_pin.cli import main; main()"
+)

@@ -67,7 +67,7 @@ class Ball:
         return scene
 
 
-def state(center, velocity, spin):
+def state(center, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)):
     """Return q0, v0 of the unturned free ball; all in the world, [m], [m/s], [rad/s]."""
     q0 = np.concatenate([np.asarray(center, dtype=float), [0.0, 0.0, 0.0, 1.0]])
     return q0, np.concatenate([velocity, spin]).astype(float)

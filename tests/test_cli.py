@@ -12,15 +12,10 @@ from typer.testing import CliRunner
 
 import sphshell_pin
 from sphshell_pin.cli import app
-from tests.command import call, refused
-from tests.programs import python
+from tests.command import call, refused, succeed
+from tests.programs import HEARS_CTRL_C, python
 from tests.scenario.files import DROP, write
 
-# Tests that run in the background pass on that Ctrl-C is to be ignored.
-HEARS_CTRL_C = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "from sphshell_pin.cli import main; main()"
-)
 XACRO = '<robot name="a" xmlns:xacro="http://www.ros.org/wiki/xacro"><link name="{}"/></robot>'
 URDF = (
     "<robot name='a'><link name='b'/>"
@@ -31,9 +26,7 @@ COMMANDS = [one.name or one.callback.__name__ for one in app.registered_commands
 
 @pytest.mark.parametrize("command", [[], *([name] for name in COMMANDS)])
 def test_every_help_has_an_example(command):
-    told = call(*command, "--help")
-    assert told.exit_code == 0
-    assert "Example: sphshell-pin" in told.output
+    assert "Example: sphshell-pin" in succeed(*command, "--help").output
 
 
 def test_it_states_its_versions():
@@ -41,66 +34,65 @@ def test_it_states_its_versions():
 
 
 def test_help_is_quick_and_imports_nothing_heavy():
-    code = (
-        "import sys; sys.argv = ['sphshell-pin', '--help']\n"
-        "from sphshell_pin.cli import app\n"
-        "try: app()\n"
-        "except SystemExit: pass\n"
-        "print([m for m in ('trimesh', 'pydantic', 'matplotlib', 'meshcat', 'pandas')\n"
-        "       if m in sys.modules])\n"
-    )
+    code = """if True:
+        import sys
+        from sphshell_pin.cli import app
+        try: app(["--help"])
+        except SystemExit: pass
+        heavy = "trimesh", "pydantic", "matplotlib", "meshcat", "pandas"
+        print([name for name in heavy if name in sys.modules])"""
     assert python(code, check=True).stdout.strip().endswith("[]")
 
 
-def test_run_prints_a_summary_and_where_the_files_are(tmp_path):
-    out = tmp_path / "out"
-    told = call("run", write(tmp_path), "--out", out, "--no-recording")
-    assert told.exit_code == 0
+@pytest.fixture
+def run(tmp_path):
+    """The arguments of a run of a drop, and of the scenario `text`, into tmp_path/out."""
+
+    def run(text=DROP):
+        return "run", write(tmp_path, text), "--out", tmp_path / "out", "--no-recording"
+
+    return run
+
+
+def test_run_prints_a_summary_and_where_the_files_are(run, tmp_path):
+    told = succeed(*run()).output
     for words in ("ball-plate", "peak force", "energy residual", "real-time factor", "run.npz"):
-        assert words in told.output
-    assert (out / "run.npz").is_file()
+        assert words in told
+    assert (tmp_path / "out" / "run.npz").is_file()
 
 
-def test_options_change_the_run(tmp_path):
-    arguments = ["run", write(tmp_path), "--out", tmp_path / "out", "--no-recording"]
-    told = call(*arguments, "--dt", "2e-5", "--duration", "0.01", "--set", "gravity=[0,0,0]")
-    assert told.exit_code == 0
+def test_options_change_the_run(run):
+    told = succeed(*run(), "--dt", "2e-5", "--duration", "0.01", "--set", "gravity=[0,0,0]")
     assert "500 steps of 2e-05 s" in told.output
-    assert "KEY=VALUE" in refused(*arguments, "--set", "run.dt")
+    assert "KEY=VALUE" in refused(*run(), "--set", "run.dt")
 
 
-def test_a_missed_expectation_is_exit_code_1_unless_the_scenario_was_changed(tmp_path):
-    path = write(tmp_path, DROP + '[expect]\n"stats.steps" = { max = 3 }\n')
-    arguments = ["run", path, "--out", tmp_path / "out", "--no-recording"]
-    told = call(*arguments)
+def test_a_missed_expectation_is_exit_code_1_unless_the_scenario_was_changed(run):
+    missed = run(DROP + '[expect]\n"stats.steps" = { max = 3 }\n')
+    told = call(*missed)
     assert told.exit_code == 1
     assert "missed" in told.output
-    told = call(*arguments, "--dt", "2e-4")
-    assert told.exit_code == 0
-    assert "not counted" in told.output
+    assert "not counted" in succeed(*missed, "--dt", "2e-4").output
 
 
-FAULTS = {
-    "no such scenario": (["run", "no_such"], "fingertip_on_blade"),
-    "no such file": (["run", "no/such.toml"], "no such file"),
-    "no such surface": (["check", "no_such.stl"], "no_such.stl"),
-    "wrong side": (["check", "no_such.stl", "--side", "up"], "outside"),
-    "wrong scale": (["check", "no_such.shl", "--scale", "big"], '"apply", "ignore" or a positive'),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_a_fault_is_one_sentence_and_exit_code_2(fault):
-    arguments, words = FAULTS[fault]
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "no_such"], "fingertip_on_blade"),
+        (["run", "no/such.toml"], "no such file"),
+        (["check", "no_such.stl"], "no_such.stl"),
+        (["check", "no_such.stl", "--side", "up"], "outside"),
+        (["check", "no_such.shl", "--scale", "big"], '"apply", "ignore" or a positive'),
+    ],
+)
+def test_a_fault_is_one_sentence_and_exit_code_2(arguments, words):
     assert words in refused(*arguments)
 
 
 def test_a_faulty_scenario_and_debug(tmp_path):
     path = write(tmp_path, DROP.replace("dt =", "dtt ="))
     assert "did you mean 'dt'" in refused("run", path)
-    told = call("--debug", "run", path)
-    assert told.exception is not None
-    assert type(told.exception).__name__ == "ScenarioError"
+    assert type(call("--debug", "run", path).exception).__name__ == "ScenarioError"
 
 
 OWN = """
@@ -114,25 +106,23 @@ def find(pose_i, pose_j):
 """
 
 
-def test_a_fault_of_the_users_routine_says_whose_it_is(tmp_path):
+def test_a_fault_of_the_users_routine_says_whose_it_is(run, tmp_path):
     (tmp_path / "own.py").write_text(OWN)
     text = DROP.replace("[run]", '[controller]\ntype = "python"\nfunction = "own.py:tau"\n[run]')
-    told = refused("run", write(tmp_path, text), "--out", tmp_path / "out")
+    told = refused(*run(text))
     assert "RuntimeError: no torque, raised by the controller at t = 0 s (own.py:tau" in told
     assert not (tmp_path / "out").exists()
     source = '[[source]]\nname = "gears"\nfind = "own.py:find"\nframe_i = "ball"\n'
-    text = DROP.replace("[run]", f'{source}law.type = "adams"\n[run]')
-    told = refused("run", write(tmp_path, text), "--out", tmp_path / "out")
+    told = refused(*run(DROP.replace("[run]", f'{source}law.type = "adams"\n[run]')))
     assert "RuntimeError: no teeth, raised by contact source 'gears' with" in told
     assert "(own.py:find, line 8)" in told
 
 
-def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(tmp_path):
+def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(run, tmp_path):
+    succeed(*run())
     out = tmp_path / "out"
-    arguments = ["run", write(tmp_path), "--out", out, "--no-recording"]
-    assert call(*arguments).exit_code == 0
     before = (out / "run.npz").read_bytes()
-    told = call(*arguments, "--set", "gravity=[0.0, 0.0, 1e30]")
+    told = call(*run(), "--set", "gravity=[0.0, 0.0, 1e30]")
     assert told.exit_code == 2
     assert "diverged at t =" in told.stderr
     assert "sphshell-pin explain" in told.stderr
@@ -142,10 +132,9 @@ def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(tmp_p
 
 
 def test_explain_names_the_pair_and_a_time_step(tmp_path):
-    told = call("explain", write(tmp_path))
-    assert told.exit_code == 0
-    assert "ball-plate" in told.output
-    assert "dt" in told.output
+    told = succeed("explain", write(tmp_path)).output
+    assert "ball-plate" in told
+    assert "dt" in told
 
 
 TRIANGLE = "v 0 0 0\nv 30 0 0\nv 0 40 0\nf 1 2 3\n"
@@ -166,9 +155,7 @@ FAN = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n
 )
 def test_check_prints_the_health_of_a_file(name, text, options, words, tmp_path):
     (tmp_path / name).write_text(text)
-    told = call("check", tmp_path / name, *options)
-    assert told.exit_code == 0
-    assert words in told.output
+    assert words in succeed("check", tmp_path / name, *options).output
 
 
 def test_check_names_a_file_that_holds_no_surface(tmp_path):
@@ -194,22 +181,16 @@ def test_check_asks_for_the_unit_as_the_command_line_states_it(tmp_path):
 
 
 def test_list_names_scenarios_and_robots():
-    told = call("list")
-    assert told.exit_code == 0
+    told = succeed("list").output
     for word in ("fingertip_on_blade", "gear_contact", "turntable"):
-        assert word in told.output
+        assert word in told
 
 
-def test_ctrl_c_keeps_what_was_computed(tmp_path):
-    path = write(tmp_path, DROP.replace("duration = 0.05", "duration = 600\nrecord_dt = 0.1"))
+def test_ctrl_c_keeps_what_was_computed(run, tmp_path):
     out = tmp_path / "out"
-    arguments = ["run", str(path), "--out", str(out), "--no-recording", "--dt", "1e-6"]
-    process = subprocess.Popen(
-        [sys.executable, "-c", HEARS_CTRL_C, *arguments],
-        stderr=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    arguments = run(DROP.replace("duration = 0.05", "duration = 600\nrecord_dt = 0.1"))
+    command = [sys.executable, "-c", HEARS_CTRL_C, *arguments, "--dt", "1e-6"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     # The folder appears just before the run starts.
     deadline = time.monotonic() + 30
     while not out.exists() and time.monotonic() < deadline:

@@ -164,10 +164,11 @@ LAYERS = (
     ("dynamics",),
     ("adapters",),
     ("patches", "robots"),
-    ("sphshell_pin", "results"),  # its public names are those of the folders above
-    ("scenario", "scenarios"),
+    ("scenario",),
     ("plot", "view", "export"),
-    ("testing",),
+    ("results", "upper_layers"),
+    ("sphshell_pin",),
+    ("scenarios", "testing"),
     ("study",),
     ("cli",),
 )
@@ -223,22 +224,11 @@ def called() -> dict[str, set[str]]:
     return {name: imports_of(file, set(modules), inside=True) for name, file in modules.items()}
 
 
-def shown_above(name: str, others: set[str]) -> set[str]:
-    """Return the modules of upper layers among `others` that a result may show itself by."""
-    above = {one for one in others if level(one) > level(name)}
-    return above if name.startswith("sphshell_pin.dynamics.result.") else set()
-
-
 @pytest.fixture(scope="module")
 def graph(called: dict[str, set[str]]) -> dict[str, set[str]]:
-    """What each module of the package imports, at once or later.
-
-    The pictures and files of themselves that values offer as methods, such as `Result.plot`, are no
-    part of it: they are imported when the method is called.
-    """
+    """What each module of the package imports, at once or later."""
     return {
-        name: imports_of(file, set(called), inside=False) - {name}
-        | called[name] - {name} - shown_above(name, called[name])
+        name: (imports_of(file, set(called), inside=False) | called[name]) - {name}
         for name, file in files_of(PACKAGE).items()
     }
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-import sphshell_pin
+from sphshell_pin._versions import __version__
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_type
@@ -57,7 +57,7 @@ def write_mcap(
     check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
     run, path = _Run(result, scene, start), Path(path)
     origin = result.origin
-    about = {"version": sphshell_pin.__version__, "start [ns]": str(start)}
+    about = {"version": __version__, "start [ns]": str(start)}
     about |= {} if origin is None else {"scenario": origin.scenario}
     about |= {f"contact {name}": topic for name, topic in run.topics.items()}
     try:

@@ -11,8 +11,8 @@ import sphshell_pin as sp
 from sphshell_pin.errors import SphshellError
 from tests import meshes, models
 from tests.contact.helpers import shell_of
-from tests.contact.test_function_friction import OWN
-from tests.contact.test_function_law import C_LAW, FORCE, force
+from tests.contact.test_function_law import C_LAW, FORCE, OWN, force
+from tests.contact.test_planes import egg, scene_of
 
 LAW, NAN, STILL, UP = sp.ImpactLaw(1e5), np.nan, pin.Motion.Zero(), [0, 0, 1]
 OTHER = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)
@@ -20,6 +20,7 @@ ZEROS, POINTER, CUBE = np.zeros(3), C_LAW.function, shell_of(meshes.cube())
 MASKED = np.ma.masked_array(ZEROS, [True, False, False])
 NO_POINTS = [[0, 0, NAN], [0, 0, np.inf], np.zeros(4), np.zeros((1, 3)), ZEROS * 1j, MASKED]
 NO_RADII = (0.0, -1.0, NAN, np.inf, True)
+SPINS = sp.BristleFriction(0.4, 0.3, 1e4, 5.0, torsional=True)
 TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0}
 
 
@@ -97,6 +98,11 @@ REFUSED: list[tuple[str, Call]] = [
     ),
     ("'text' must be names", lambda: sp.FunctionFriction(POINTER, {"text": 1.0})),
     (r"FunctionLaw\(function\).*docs/laws.md", lambda: pressed(force)),
+    # Planes
+    *(("must be 'smooth'", lambda m=m: scene_of(CUBE, method=m)) for m in ("facets", "elements")),
+    ("must be a Shell", lambda: scene_of(sp.Sphere(0.1, "body"))),
+    ("follows from the radius", lambda: scene_of(egg(), friction=SPINS)),
+    ("must not be zero", lambda: sp.Plane("universe", normal=(0.0, 0.0, 0.0))),
     # Friction
     ("mu_dynamic", lambda: sp.CoulombFriction(0.1, 0.3, 0.1, 1.0)),
     ("v_dynamic", lambda: sp.CoulombFriction(0.3, 0.1, 0.1, 0.1)),

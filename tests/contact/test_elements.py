@@ -24,12 +24,3 @@ def test_what_the_neighbour_adds(offset: float, neighbour: float) -> None:
     exact = ((radius - np.hypot(radius - depth, s)) / depth) ** 2.2
     assert got == pytest.approx(exact, abs=1e-12)
     assert got == pytest.approx(neighbour, abs=6e-4)
-
-
-@pytest.mark.parametrize("aside", [(0.1, -0.1), (-0.1, 0.1)])
-def test_a_quad_counts_once(aside: tuple[float, float]) -> None:
-    """Whichever of its two triangles is nearer, for the first and the last element as well."""
-    shell = shell_of(meshes.grid_plate(3, 1, 3.0, quads=True))
-    for k, x in enumerate((-1.0, 0.0, 1.0)):
-        found = shell.contacts([x + aside[0], aside[1], 0.3], 0.35, method="elements")
-        assert found.element.tolist() == [k]

@@ -143,15 +143,6 @@ def test_normals_turn_as_the_faces_say(step):
     assert {feature for feature, _ in met} >= {sp.Feature.FACE, sp.Feature.EDGE}
 
 
-def test_no_faces_no_closed_forms():
-    ball = sp.Shell.from_geometry(coal.Sphere(0.1), segments=24)
-    curved = sp.Shell(ball.vertices, ball.triangles, normals=ball.normals, faces=False)
-    shell = sp.Shell(ball.vertices, ball.triangles, normals=ball.normals)
-    center = 0.119 * np.array([0.6, 0.48, 0.64])
-    assert shell.contacts(center, 0.02).depth[0] == pytest.approx(1e-3, abs=1e-12)
-    assert abs(curved.contacts(center, 0.02).depth[0] - 1e-3) > 1e-9
-
-
 def touch(shell: sp.Shell, center, radius: float) -> sp.results.ContactSet:
     found = shell.contacts(center, radius)
     assert len(found) == 1, found

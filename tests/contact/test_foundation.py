@@ -73,21 +73,6 @@ def test_on_a_sphere(ball: float, depth: float) -> None:
     assert found[6][0] == pytest.approx(slope, abs=1e-8 * np.abs(slope).max())
 
 
-@pytest.mark.parametrize("depth", [0.01, 0.3])
-def test_order_on_a_dome(depth: float) -> None:
-    """Meshes of half the size have at most a quarter of the error, down to 1e-9."""
-    rng = np.random.default_rng(0)
-    out = directions(rng, 6)
-    force = -oracle.slope(lambda x: oracle.energy_in_ball(4.0, x, 1.0), 5 - depth, 1e-3)
-    errors = []
-    for h in (0.6, 0.3, 0.15):
-        found = [total(shell_of("dome", h), (5 - depth) * n)[0] for n in out]
-        errors.append(max(np.linalg.norm(f / force - n) for f, n in zip(found, out, strict=True)))
-    assert errors[1] <= 1e-5
-    assert errors[1] <= max(errors[0] / 4, 1e-9)
-    assert errors[2] <= max(errors[1] / 4, 1e-9)
-
-
 @cache
 def socket(size: float, level: int) -> Shell:
     vertices, elements = meshes.icosphere(level, 1.0)
@@ -113,14 +98,9 @@ def test_in_a_socket(size: float) -> None:
 def test_round_a_cube() -> None:
     """Creases and corners of a solid, outside it and with the center inside."""
     shell = Shell(*meshes.cube(2.0), side="outside")
-    centers = [
-        (1.2, 0.3, -0.1),
-        (1.4, 1.3, 0.2),
-        (1.3, 1.2, 1.35),
-        (0.8, 0.7, 0.9),
-        (0.1, 0.2, 0.9),
-    ]
-    for center in np.array(centers):
+    for center in np.array(
+        [(1.2, 0.3, -0.1), (1.4, 1.3, 0.2), (1.3, 1.2, 1.35), (0.8, 0.7, 0.9), (0.1, 0.2, 0.9)]
+    ):
         exact = oracle.energy_in_box(-np.ones(3), np.ones(3), center, 1.0)
         assert total(shell, center)[1] == pytest.approx(exact, rel=2e-3)
 
@@ -162,29 +142,23 @@ def test_hole_and_thin_wall() -> None:
     plug = total(Shell(vertices, elements[inner]), center)
     for all_, part, rest in zip(whole, ring, plug, strict=True):
         assert part + rest == pytest.approx(all_, abs=1e-9 * np.abs(all_).max())
-    thin = Shell(*_slab(0.05), side="outside")
-    force, energy, _ = total(thin, [0.0, 0.0, 0.025 + 0.8])
-    below = plane_force(1.0, 0.15)
-    assert force[2] == pytest.approx(plane_force(1.0, 0.2) - below, rel=1e-12)
-    assert energy > 0
-
-
-def _slab(thickness: float):
     vertices, elements = meshes.cube(4.0)
-    return vertices * [1.0, 1.0, thickness / 4.0], elements
+    thin = Shell(vertices * [1.0, 1.0, 0.0125], elements, side="outside")
+    force, energy, _ = total(thin, [0.0, 0.0, 0.025 + 0.8])
+    exact = plane_force(1.0, 0.2) - plane_force(1.0, 0.15)
+    assert force[2] == pytest.approx(exact, rel=1e-12)
+    assert energy > 0
 
 
 @pytest.mark.parametrize("kind", ["dome", "cube", "sheet", "random"])
 def test_points_add_up(kind: str) -> None:
     """Forces of the quadrature points, their patches' and the whole."""
-    center = np.array([1.9, 1.2, 0.85])
-    if kind == "dome":
-        shell, center = shell_of("dome", 0.6), np.array([1.0, 2.0, 4.3])
-    elif kind == "random":
-        shell, center = Shell(*PLATES["random"]()), np.array([0.1, 0.2, 0.9])
-    else:
-        shell = edged(kind)
-        center = np.array([2.3, 2.2, 2.6]) if kind == "cube" else center
+    shell, center = {
+        "dome": lambda: (shell_of("dome", 0.6), [1.0, 2.0, 4.3]),
+        "cube": lambda: (edged("cube"), [2.3, 2.2, 2.6]),
+        "sheet": lambda: (edged("sheet"), [1.9, 1.2, 0.85]),
+        "random": lambda: (Shell(*PLATES["random"]()), [0.1, 0.2, 0.9]),
+    }[kind]()
     rows, (points, normals, areas, pressures, forces, row) = foundation(shell, center, points=True)
     force = rows[4].sum(axis=0)
     assert np.linalg.norm(forces.sum(axis=0) - force) <= 1e-13 * np.linalg.norm(force)
@@ -199,24 +173,6 @@ def test_points_add_up(kind: str) -> None:
     if kind in ("dome", "cube"):
         moment = np.cross(points - center, forces).sum(axis=0)
         assert np.linalg.norm(moment) <= 1e-6 * np.linalg.norm(force)
-
-
-def test_points_follow_the_area_and_not_the_aspect() -> None:
-    """On a plane of needles of aspect 1e4, few points have the moments of those on squares."""
-    squares, needles = meshes.grid_plate(12, 12, size=4.0), meshes.grid_plate(1, 12, size=4.0)
-    sums, counts = [], []
-    for (vertices, elements), stretch in ((squares, 1.0), (needles, 1e4 / 12)):
-        center = np.array([0.4 * stretch, 0.03, 0.1])
-        _, (points, *_, forces, _) = foundation(
-            Shell(vertices * [stretch, 1, 1], elements), center, points=True
-        )
-        arms = points - center
-        sums.append(
-            [forces[:, 2].sum(), forces[:, 2] @ arms[:, 0] ** 2, forces[:, 2] @ arms[:, 1] ** 2]
-        )
-        counts.append(len(points))
-    assert sums[1] == pytest.approx(sums[0], rel=1e-6)
-    assert counts[1] < 4 * counts[0]
 
 
 def test_rows_are_patches() -> None:

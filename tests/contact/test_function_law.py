@@ -1,4 +1,4 @@
-"""A law of one's own does what the law does whose formula it states."""
+"""Laws and friction of one's own do what those do whose formulas they state."""
 
 import copy
 import ctypes
@@ -17,16 +17,22 @@ from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.testing import assert_derivatives
 from tests import models
+from tests.contact.test_table_law import LAW_LINE, SPRING, TABLE
 from tests.scenario.files import DROP, write
 
 FORCE = ctypes.CFUNCTYPE(
     ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double)
 )
 ENERGY = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
-NUMBERS = {"k": 1e6, "b": 0.5}
+NUMBERS, SLIP = {"k": 1e6, "b": 0.5}, {"mu": 0.3, "v": 0.1}
 TWIN = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
-LAW_LINE = next(line for line in DROP.splitlines() if line.startswith("law"))
-STATED = 'law = { type = "function", function = "own.py:force", parameters = { k = 1e6, b = 0.5 } }'
+SMOOTH = sp.CoulombFriction(0.3, 0.3, 0.1, 0.2)  # a cubic up to 0.1 m/s
+LAW = 'law = { type = "function", function = "own.py:force", parameters = { k = 1e6, b = 0.5 } }'
+FRICTION = LAW.replace("law", "friction", 1).replace("force", "size").replace("k = 1e6", "mu = 0.3")
+FRICTION = FRICTION.replace("b = 0.5", "v = 0.1")
+BALL = np.array([0.01, 0.02, 0.0492, 0, 0, 0, 1.0])
+MOVES = np.array([0.1, 0.0, -0.05, 1.0, 2.0, 0.0])
+SLOW = np.array([0.03, 0.02, -0.05, 0.4, 0.3, 0.2])  # 0.03 m/s of slip and some spin
 
 
 def force(depth, gap_rate, parameters):
@@ -37,12 +43,23 @@ def energy(depth, parameters):
     return 0.4 * parameters[0] * depth**2.5
 
 
+def size(slip, normal, parameters):
+    x = min(slip / parameters[1], 1.0)
+    return parameters[0] * normal * x * (3 - x * x) / 2
+
+
 C_LAW = sp.FunctionLaw(FORCE(force), ENERGY(energy), NUMBERS)
+OWN = sp.FunctionFriction(FORCE(size), SLIP)
 
 
 def python_law(function=force, numbers=NUMBERS):
     with pytest.warns(errors.SlowLawWarning, match=r"numba\.cfunc"):
         return sp.FunctionLaw(function, parameters=numbers)
+
+
+def python_friction():
+    with pytest.warns(errors.SlowLawWarning, match="a FunctionFriction of a Python function"):
+        return sp.FunctionFriction(size, SLIP)
 
 
 def numba_law():
@@ -51,16 +68,9 @@ def numba_law():
     return sp.FunctionLaw(compiled, parameters=NUMBERS)
 
 
-KINDS = {
-    "ctypes": lambda: C_LAW,
-    "python": python_law,
-    "numba": numba_law,
-}
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_it_answers_as_its_twin(kind) -> None:
-    law = KINDS[kind]()
+@pytest.mark.parametrize("make", [lambda: C_LAW, python_law, numba_law])
+def test_a_law_answers_as_its_twin(make) -> None:
+    law = make()
     for depth in (1e-6, 1e-4, 3e-3):
         for rate in (0.0, -0.2, 0.4, 5.0):
             assert law.normal_force(depth, rate) == pytest.approx(TWIN.normal_force(depth, rate))
@@ -73,8 +83,21 @@ def test_it_answers_as_its_twin(kind) -> None:
     assert (law.k, law.b) == (1e6, 0.5)
 
 
-BALL = np.array([0.01, 0.02, 0.0492, 0, 0, 0, 1.0])
-MOVES = np.array([0.1, 0.0, -0.05, 1.0, 2.0, 0.0])
+@pytest.mark.parametrize("make", [lambda: OWN, python_friction], ids=["C", "python"])
+def test_friction_answers_as_its_twin(make) -> None:
+    own = make()
+    for speed in (0.0, 1e-6, 0.02, 0.1, 3.0):
+        assert own.coefficient(speed, 5.0) == pytest.approx(SMOOTH.coefficient(speed), abs=1e-12)
+    assert own.slip_time(2.0, 7.0, 0.0) == pytest.approx(SMOOTH.slip_time(2.0, 7.0, 0.0), rel=1e-9)
+    assert own.largest_coefficient == pytest.approx(0.3, rel=0.01)
+    assert own.sticking_speed == pytest.approx(0.1, rel=0.15)
+    assert (own.mu, own.v, own.has_state) == (0.3, 0.1, False)
+    scenes = [models.on_plate(models.ball(), TWIN, one) for one in (own, SMOOTH)]
+    for moves in (SLOW, MOVES, 0 * MOVES):
+        ours, theirs = (one.external_forces(BALL, moves)[1].vector for one in scenes)
+        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+    (made,) = scenes[0].constraints(BALL).models
+    np.testing.assert_allclose(made.getFriction(), own.largest_coefficient)
 
 
 DEPTHS = [1e-13, 3e-7, 0.99e-4, 1.01e-4, 4e-4, 2e-3]
@@ -98,43 +121,64 @@ def test_the_energy_is_the_integral_over_kinks(name) -> None:
             assert np.isclose(law.energy(depth), expected(depth), rtol=1e-9, atol=1e-20)
 
 
-@pytest.mark.parametrize("friction", [models.FRICTION, sp.BristleFriction(0.5, 0.4, 1e4, 10.0)])
-def test_derivatives_are_those_of_the_twin(friction) -> None:
-    own, twin = (models.on_plate(models.ball(), law, friction) for law in (C_LAW, TWIN))
-    assert_derivatives(own, BALL, MOVES)
-    numbers = (
-        ["ball-plate.law.k", "ball-plate.law.b"],
-        ["ball-plate.law.stiffness", "ball-plate.law.dissipation"],
-    )
+# Law and friction of one's own, those of the twin, numbers of both, what derivatives differ by.
+LAWS = (["law.k", "law.b"], ["law.stiffness", "law.dissipation"], 1e-8)
+BRISTLES = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
+TWINS = [
+    ((C_LAW, models.FRICTION), (TWIN, models.FRICTION), MOVES, *LAWS),
+    ((C_LAW, BRISTLES), (TWIN, BRISTLES), MOVES, *LAWS),
+    *(
+        ((law, OWN), (law, SMOOTH), moves, [], [], 1e-7)
+        for law in (TWIN, C_LAW)
+        for moves in (SLOW, MOVES, 0 * MOVES)
+    ),
+]
+
+
+@pytest.mark.parametrize(("own", "twin", "moves", "ours", "theirs", "error"), TWINS)
+def test_derivatives_are_those_of_the_twin(own, twin, moves, ours, theirs, error) -> None:
+    scenes = [models.on_plate(models.ball(), *one) for one in (own, twin)]
+    if moves.any():
+        assert_derivatives(scenes[0], BALL, moves)
     found, exact = (
-        scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)
-        for scene, names in zip((own, twin), numbers, strict=True)
-    )
-    for name in ("by_q", "by_v", "by_parameters"):
-        ours, theirs = getattr(found, name), getattr(exact, name)
-        np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-8 * np.abs(theirs).max())
-
-
-def test_a_run_is_that_of_the_twin_and_keeps_its_energy() -> None:
-    own, twin = (
-        sp.Simulation(models.on_plate(models.slider(), law), sp.Adaptive(1e-10)).run(
-            [0.051], [-0.1], 0.2, record_dt=1e-3
+        scene.dynamics_derivatives(
+            BALL, moves, np.zeros(6), parameters=[f"ball-plate.{name}" for name in names]
         )
-        for law in (C_LAW, TWIN)
+        for scene, names in zip(scenes, (ours, theirs), strict=True)
     )
-    np.testing.assert_allclose(own.q, twin.q, rtol=0, atol=1e-9)
-    assert np.abs(own.energy.residual).max() < 1e-8
+    for name in ("by_q", "by_v", *(["by_parameters"] if ours else [])):
+        a, b = getattr(found, name), getattr(exact, name)
+        np.testing.assert_allclose(a, b, rtol=0, atol=error * np.abs(b).max())
+
+
+@pytest.mark.parametrize(
+    ("own", "twin", "error"),
+    [
+        ((C_LAW, None), (TWIN, None), 1e-9),
+        ((TABLE, None), (SPRING, None), 1e-6),
+        ((TWIN, OWN), (TWIN, SMOOTH), 1e-8),
+    ],
+)
+def test_a_run_is_that_of_the_twin_and_keeps_its_energy(own, twin, error) -> None:
+    ours, theirs = (
+        sp.Simulation(models.on_plate(models.ball(), *one), sp.Adaptive(1e-10)).run(
+            BALL, MOVES, 0.2, record_dt=1e-3
+        )
+        for one in (own, twin)
+    )
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=error)
+    assert np.abs(ours.energy.residual).max() < 1e-8
+    assert (ours.energy.friction_loss[-1] > 1e-4) == (own[1] is not None)
 
 
 @pytest.mark.parametrize("make", [lambda: C_LAW, python_law], ids=["C", "python"])
 def test_rollouts_vary_its_numbers_over_threads(make) -> None:
     stiff = [5e5, 1e6, 2e6, 4e6]
-    own, twin = models.on_plate(models.slider(), make()), models.on_plate(models.slider(), TWIN)
-    runs = sp.Simulation(own).rollout(
-        [[0.0505]] * 4, None, 0.05, vary={"ball-plate.law.k": stiff}, threads=2
-    )
-    exact = sp.Simulation(twin).rollout(
-        [[0.0505]] * 4, None, 0.05, vary={"ball-plate.law.stiffness": stiff}
+    runs, exact = (
+        sp.Simulation(models.on_plate(models.slider(), law)).rollout(
+            [[0.0505]] * 4, None, 0.05, vary={f"ball-plate.law.{name}": stiff}, threads=2
+        )
+        for law, name in ((make(), "k"), (TWIN, "stiffness"))
     )
     assert not runs.failures
     np.testing.assert_allclose(runs.q, exact.q, rtol=0, atol=1e-12)
@@ -154,21 +198,49 @@ def test_exceptions_of_a_python_function_pass() -> None:
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf])
 def test_no_number_is_refused(wrong) -> None:
-    laws = [
-        sp.FunctionLaw(FORCE(lambda depth, rate, p: wrong)),
-        python_law(lambda depth, rate, p: wrong, {}),
-        sp.FunctionLaw(FORCE(force), ENERGY(lambda depth, p: wrong), NUMBERS),
-    ]
-    for law, what in zip(laws, ("force", "force", "energy"), strict=True):
+    for law, what in (
+        (sp.FunctionLaw(FORCE(lambda depth, rate, p: wrong)), "force"),
+        (python_law(lambda depth, rate, p: wrong, {}), "force"),
+        (sp.FunctionLaw(FORCE(force), ENERGY(lambda depth, p: wrong), NUMBERS), "energy"),
+    ):
         simulation = sp.Simulation(models.on_plate(models.slider(), law))
-        with pytest.raises(
-            errors.SphshellError, match=rf"the {what} of a FunctionLaw is {wrong} at dep"
-        ):
+        said = rf"the {what} of a FunctionLaw is {wrong} at dep"
+        with pytest.raises(errors.SphshellError, match=said):
             simulation.run([0.0499], None, 0.01)
-    with pytest.raises(errors.InvalidParameter, match="function returns 'a', must return a number"):
-        python_law(lambda depth, rate, p: "a", {}).normal_force(1.0)
-    with pytest.raises(errors.InvalidParameter, match="returns a larger one, must return a number"):
-        python_law(lambda depth, rate, p: 10**5000, {}).normal_force(1.0)
+    friction = sp.FunctionFriction(FORCE(lambda slip, normal, p: wrong))
+    scene = models.on_plate(models.ball(), TWIN, friction)
+    with pytest.raises(errors.SphshellError, match=f"FunctionFriction is {wrong} at slip speed"):
+        scene.external_forces(BALL, MOVES)
+    for answer, said in (("a", "returns 'a'"), (10**5000, "returns a larger one")):
+        with pytest.raises(errors.InvalidParameter, match=f"{said}, must return a number"):
+            python_law(lambda depth, rate, p, answer=answer: answer, {}).normal_force(1.0)
+
+
+def test_friction_that_follows_from_the_load_by_no_coefficient() -> None:
+    """Adhesion: a part of the force that is there whatever the load."""
+    own = sp.FunctionFriction(
+        FORCE(lambda slip, normal, p: (p[0] + 0.2 * normal) * min(slip / 0.01, 1.0)),
+        {"adhesion": 3.0},
+    )
+    scene = models.on_plate(models.ball(), TWIN, own)
+    contacts = scene.contacts(BALL, MOVES)
+    (normal,), (friction,) = contacts.normal_force, contacts.friction_force_world
+    assert np.linalg.norm(friction) == pytest.approx(3.0 + 0.2 * normal, rel=1e-12)
+    assert own.coefficient(1.0, 10.0) == pytest.approx(0.5)
+    slopes = scene.dynamics_derivatives(
+        BALL, MOVES, np.zeros(6), parameters=["ball-plate.friction.adhesion"]
+    )
+    # Of 1 N more of it.
+    pushed = scene.model.inertias[1].mass * slopes.by_parameters[:3, 0]
+    np.testing.assert_allclose(pushed, friction / np.linalg.norm(friction), rtol=0, atol=1e-6)
+
+
+def test_friction_that_drives_is_none_and_one_at_rest_is_warned_of() -> None:
+    scene = models.on_plate(models.ball(), TWIN, sp.FunctionFriction(FORCE(lambda s, n, p: -n)))
+    assert not scene.contacts(BALL, MOVES).friction_force_world.any()
+    constant = sp.FunctionFriction(FORCE(lambda s, n, p: 0.3 * n))
+    with pytest.warns(errors.SetupWarning, match="does not vanish at rest"):
+        models.on_plate(models.ball(), TWIN, constant)
 
 
 def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
@@ -183,12 +255,8 @@ def test_a_law_that_cannot_carry_the_load_is_refused_at_once() -> None:
 
 def test_the_energy_of_noise_takes_no_longer_than_that_of_jumps() -> None:
     rng, calls = random.Random(1), []
-
-    def noise(depth, rate, p):
-        calls.append(depth)
-        return rng.random()
-
-    assert python_law(noise, {}).energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
+    law = python_law(lambda depth, rate, p: calls.append(depth) or rng.random(), {})
+    assert law.energy(1e-3) == pytest.approx(0.5e-3, rel=0.2)
     assert len(calls) < 100_000
 
 
@@ -236,24 +304,32 @@ def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
     assert core.force(1e-3, 0.0) == pytest.approx(TWIN.normal_force(1e-3))
 
 
-def test_a_scenario_names_a_function_which_looking_does_not_execute(tmp_path) -> None:
-    code = "import math\nopen('ran', 'a').close()\ndef force(d, r, p):\n"
-    code += "    return p[0] * d * math.sqrt(d) * (1 - p[1] * r)\n"
-    (tmp_path / "own.py").write_text(code.replace("'ran'", repr(str(tmp_path / "ran"))))
-    path = write(tmp_path, DROP.replace(LAW_LINE, STATED))
+def test_a_scenario_names_functions_which_looking_does_not_execute(tmp_path) -> None:
+    code = f"import math\nopen({str(tmp_path / 'ran')!r}, 'a').close()\n"
+    code += "def force(d, r, p):\n    return p[0] * d * math.sqrt(d) * (1 - p[1] * r)\n"
+    code += "def size(s, n, p):\n    x = min(s / p[1], 1.0)\n"
+    code += "    return p[0] * n * x * (3 - x * x) / 2\n"
+    (tmp_path / "own.py").write_text(code)
+    text = DROP.replace(LAW_LINE, f"{LAW}\n{FRICTION}")
+    path = write(tmp_path, text)
     with pytest.warns(errors.SlowLawWarning):
         built = build(path)
-    law = built.scene.pairs[0].law
-    assert isinstance(law, sp.FunctionLaw)
-    assert law.parameters == NUMBERS
+    (pair,) = built.scene.pairs
+    assert isinstance(pair.law, sp.FunctionLaw)
+    assert isinstance(pair.friction, sp.FunctionFriction)
+    assert (pair.law.parameters, pair.friction.parameters) == (NUMBERS, SLIP)
     result = built.simulation.run(built.q0, built.v0, 0.01)
+    starts, speeds = [built.q0] * 2, [[0.1, 0.0, -0.2, 0.0, 0.0, 0.0]] * 2
+    mu = {"ball-plate.friction.mu": [0.1, 0.5]}
+    runs = built.simulation.rollout(starts, speeds, 0.02, vary=mu)
+    assert runs[0].v[-1][0] > runs[1].v[-1][0]
     (tmp_path / "ran").unlink()
     replay = Replay(result, path)
     assert not (tmp_path / "ran").exists()
     with pytest.raises(errors.SphshellError, match=r"law\.function: 'own.py:force' was not loaded"):
         replay.scene.pairs[0].law.normal_force(1e-3)
     with pytest.raises(errors.ScenarioError, match="no such file") as caught:
-        build(write(tmp_path, DROP.replace(LAW_LINE, STATED.replace("own", "other"))))
+        build(write(tmp_path, text.replace("own", "other")))
     assert caught.value.key == "contact.ball-plate.law.function"
 
 

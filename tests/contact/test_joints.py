@@ -8,6 +8,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.curvature import curved_mesh
+from sphshell_pin.shell.raw import random_places
 from tests.contact.test_faces import VALVE_BODY
 from tests.joints.boxes import BOXES
 from tests.joints.solids import write_step
@@ -148,11 +149,9 @@ def test_a_border_to_a_free_form_face_ends_on_its_face(folder):
     (boss,) = [face for face in shell.faces if face.kind == "cylinder"]
     assert boss.exact
     rng, count, ball, depth = np.random.default_rng(0), 300, 2e-3, 2e-4
-    p, q, r = shell.vertices[shell.triangles[np.isin(shell.triangle_element, boss.elements)]][
-        rng.integers(0, len(boss.elements), count)
-    ].transpose(1, 0, 2)
-    share = rng.dirichlet(np.ones(3), count).T[..., None]
-    place = share[0] * p + share[1] * q + share[2] * r - boss.point
+    mine = np.isin(shell.triangle_element, boss.elements)
+    _, on = random_places(shell.vertices[shell.triangles[mine]], count, rng)
+    place = on - boss.point
     along = place @ boss.axis
     out = place - along[:, None] * boss.axis
     out /= np.linalg.norm(out, axis=1)[:, None]

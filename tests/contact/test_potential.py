@@ -9,13 +9,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.integrate import quad
 
 import sphshell_pin as sp
 from tests.contact.test_function_law import FORCE
-from tests.contact.test_planes import scene_of
 from tests.models import block, on_shell
 
 pytestmark = pytest.mark.filterwarnings("ignore::scipy.integrate.IntegrationWarning")
@@ -141,33 +139,3 @@ def test_no_work_is_done_by_a_foundation_on_facets(name: str, shells) -> None:
     radius = SURFACES[name][1]
     law = LAWS["foundation"](radius)
     assert worst_loop(shells(name, "faces"), radius, law, 1, "facets") < 1e-6
-
-
-@pytest.mark.parametrize("law", ["impact", "hunt-crossley", "table", "function", "foundation"])
-@pytest.mark.parametrize("name", ["seat.obj", "bottle.obj"])
-def test_no_work_is_done_by_a_plane(name: str, law: str, shells) -> None:
-    """A shell that turns and sinks beside a plane, around a loop of poses."""
-    shell = shells(name, "faces")
-    size = np.ptp(shell.vertices, axis=0).max()
-    scene = scene_of(shell, LAWS[law](size))
-    rng, still = np.random.default_rng(3), np.zeros(6)
-    turn = pin.exp3(rng.normal(size=3))
-    lowest = (shell.vertices @ turn.T)[:, 2].min()
-    # Coordinates of poses about the first one: each side is a path in them, whatever its metric.
-    first = pin.SE3ToXYZQUAT(pin.SE3(turn, np.array([0.0, 0.0, -lowest - 0.02 * size])))
-    corners = np.array([np.zeros(6), *(rng.normal(size=(2, 6)) * 0.01)])
-    corners[:, 2] *= size
-    largest = 0.0
-
-    def work(x: np.ndarray, side: np.ndarray) -> float:
-        nonlocal largest
-        q = pin.integrate(scene.model, first, x)
-        force = scene.external_forces(q, still)[1].vector
-        largest = max(largest, np.linalg.norm(force[:3]))
-        # The velocity where the coordinates change by `side` per unit.
-        jacobian = pin.dIntegrate(scene.model, first, x, pin.ArgumentPosition.ARG1)
-        return force @ (jacobian @ side)
-
-    around = work_around(work, corners)
-    assert largest > 0
-    assert abs(around) < 1e-5 * largest * 0.02 * size

@@ -65,13 +65,11 @@ def test_the_slope_is_continuous_at_the_rows() -> None:
 
 
 def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
-    for depth in np.linspace(0.0, 2e-3, 997):
-        assert TABLE.normal_force(depth) == pytest.approx(
-            SPRING.normal_force(depth), abs=1e-6 * TABLE.force[-1]
-        )
-        assert TABLE.energy(depth) == pytest.approx(
-            SPRING.energy(depth), abs=1e-6 * SPRING.energy(2e-3)
-        )
+    for ask in ("normal_force", "energy"):
+        most = getattr(SPRING, ask)(2e-3)
+        for depth in np.linspace(0.0, 2e-3, 997):
+            exact = getattr(SPRING, ask)(depth)
+            assert getattr(TABLE, ask)(depth) == pytest.approx(exact, abs=1e-6 * most)
     for question in (
         lambda law: law.depth_at(20.0),
         lambda law: law.depth_of(1e-3),
@@ -79,17 +77,6 @@ def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
         lambda law: law.shortest_time(1.0, 0.3, 10.0),
     ):
         assert question(TABLE) == pytest.approx(question(SPRING), rel=1e-5)
-
-
-def bounce(law: sp.TableLaw | sp.ImpactLaw) -> sp.Result:
-    scene = models.on_plate(models.slider(), law)
-    return sp.Simulation(scene, sp.Adaptive(1e-10)).run([0.051], [-0.1], 0.3, record_dt=1e-3)
-
-
-def test_a_run_is_that_of_the_spring_and_keeps_its_energy() -> None:
-    table, spring = bounce(TABLE), bounce(SPRING)
-    np.testing.assert_allclose(table.q, spring.q, atol=1e-6)
-    assert np.abs(table.energy.residual).max() < 1e-8
 
 
 def test_derivatives_rollout_explain_and_pickle() -> None:
@@ -115,10 +102,8 @@ def test_a_scenario_names_a_file_beside_it(tmp_path) -> None:
     text = DROP.replace(LAW_LINE, 'law = { type = "table", file = "rubber.csv" }')
     built = build(write(tmp_path, text))
     assert built.scene.pairs[0].law == TABLE
-    assert built.scenario.model_dump()["contact"][0]["law"] == {
-        "type": "table",
-        "file": "rubber.csv",
-    }
+    stated = built.scenario.model_dump()["contact"][0]["law"]
+    assert stated == {"type": "table", "file": "rubber.csv"}
     result = built.simulation.run(built.q0, built.v0, 0.01)
     result.save(tmp_path / "run.npz")
     np.testing.assert_array_equal(sp.Result.load(tmp_path / "run.npz").q, result.q)
@@ -129,7 +114,6 @@ def test_a_scenario_names_a_file_beside_it(tmp_path) -> None:
     [
         ("0,0\n", "at least 2 rows"),
         ("", "at least 2 rows"),
-        ("0,0\n1e-3,1\n", None),
         ("0,0\n1e-3,1\n1e-3,2\n", r"depth\[2\] = 0.001 must be more than the row before, 0.001"),
         ("0,0\n1e-3,2\n2e-3,1\n", r"force\[2\] = 1.0 must be more than the row before, 2.0"),
         ("1e-3,0\n2e-3,1\n", r"depth\[0\] = 0.001 must be 0"),
@@ -145,9 +129,6 @@ def test_a_wrong_file_is_refused_in_one_sentence(rows, said, tmp_path) -> None:
     if rows is not None:
         (tmp_path / "t.csv").write_text(rows)
     text = DROP.replace(LAW_LINE, 'law = { type = "table", file = "t.csv" }')
-    if said is None:
-        assert build(write(tmp_path, text)).scene.pairs[0].law.force == (0.0, 1.0)
-        return
     with pytest.raises(ScenarioError, match=said) as caught:
         build(write(tmp_path, text))
     assert caught.value.key == "contact.ball-plate"

@@ -47,6 +47,7 @@ DAMPED = {
     "impact, all": (sp.ImpactLaw(1e5, 1.5, 8.0, 0.1 * DEPTH), (8.0, 8.0, 0.0)),
     "hunt-crossley": (sp.HuntCrossleyLaw(1e5, 1.0, 0.5), (50e3 * DEPTH, 25e3 * DEPTH, 0.0)),
     "undamped": (sp.HuntCrossleyLaw(1e5, 1.0), (0.0, 0.0, 0.0)),
+    "table": (sp.TableLaw([0.0, 1.0], [0.0, 1.0]), (0.0, 0.0, 0.0)),
     "function": (lambda: sp.FunctionLaw(lambda d, r, p: 1e5 * d - 7.0 * d**2 * r), None),
     "function that drives": (lambda: sp.FunctionLaw(lambda d, r, p: 1e5 * d + 7.0 * r), (0.0,) * 3),
     "hertz": (sp.HertzLaw(*RUBBER, restitution=0.5, speed=1.0, radius=0.05), None),
@@ -85,67 +86,70 @@ def test_the_shortest_of_impact_oscillation_and_decay(load: float, damping: floa
 
 def test_a_soft_law_under_a_light_load() -> None:
     soft = sp.ImpactLaw(1e-3, 2.0)
-    depth = soft.depth_of(0.5 * MASS * SPEED**2)
-    stiffness = soft.normal_stiffness(soft.depth_at(0.9))
-    half = math.pi * math.sqrt(MASS / stiffness)
-    assert 0 < stiffness < 1
-    assert half < soft.contact_time(depth, SPEED)
+    half = math.pi * math.sqrt(MASS / soft.normal_stiffness(soft.depth_at(0.9)))
+    assert half < soft.contact_time(soft.depth_of(0.5 * MASS * SPEED**2), SPEED)
     assert soft.shortest_time(MASS, SPEED, 0.9) == pytest.approx(half, rel=1e-9)
-    linear = sp.ImpactLaw(0.1, 1.0)
     expected = math.pi * math.sqrt(MASS / 0.1)
-    assert linear.shortest_time(MASS, SPEED, 0.0) == pytest.approx(expected, rel=1e-9)
-    assert sp.TableLaw([0.0, 1.0], [0.0, 1.0]).decay_time(MASS, 0.5) == math.inf
+    assert sp.ImpactLaw(0.1, 1.0).shortest_time(MASS, SPEED, 0.0) == pytest.approx(expected)
 
 
 def test_a_law_that_cannot_carry_the_load_has_its_other_scales() -> None:
     layer = sp.FoundationLaw(1e6, 0.05).on_plane(0.05)
-    most = layer.normal_force(0.05)
-    assert layer.depth_at(most) == pytest.approx(0.05, rel=1e-9)
-    assert layer.depth_at(3 * most) == pytest.approx(0.15, rel=1e-12)
-    assert layer.depth_at(0.5 * most) < 0.05
-    stored = layer.energy(0.05)
-    assert layer.depth_of(stored) == pytest.approx(0.05, rel=1e-9)
-    assert layer.depth_of(3 * stored) == pytest.approx(0.15, rel=1e-12)
+    for inverted, most in (
+        (layer.depth_at, layer.normal_force(0.05)),
+        (layer.depth_of, layer.energy(0.05)),
+    ):
+        assert inverted(most) == pytest.approx(0.05, rel=1e-9)
+        assert inverted(3 * most) == pytest.approx(0.15, rel=1e-12)
+        assert inverted(0.5 * most) < 0.05
     assert layer.contact_time(0.15, 1.0) == layer.contact_time(0.05, 1.0)
     assert layer.contact_time(0.02, 1.0) < layer.contact_time(0.05, 1.0)
 
 
-def test_slow_slip_of_coulomb_friction() -> None:
-    friction = sp.CoulombFriction(0.4, 0.3, 1e-3, 1e-2)
-    # mu (3 - s^2) s / 2 with s = v / v_static: a damper of 1.5 mu N / v_static.
-    assert friction.slip_time(MASS, 50.0, 1.0) == pytest.approx(20 * MASS * 1e-3 / (1.5 * 0.4 * 50))
-    light = friction.slip_time(MASS, 0.5, 1.0)
-    assert light == pytest.approx(100 * friction.slip_time(MASS, 50.0, 1.0))
-    assert friction.slip_time(MASS, 0.0, 1.0) == math.inf
-    assert friction.slip_time(MASS, -1.0, 1.0) == math.inf
-    assert sp.CoulombFriction(0.0, 0.0).slip_time(MASS, 50.0, 1.0) == math.inf
+def half(stiffness: float) -> float:
+    return math.pi * math.sqrt(MASS / stiffness)
 
 
-def test_bristles_ring_or_decay() -> None:
-    soft = sp.BristleFriction(0.4, 0.3, 0.5)
-    assert soft.slip_time(MASS, 50.0, 1.0) == pytest.approx(math.pi * math.sqrt(MASS / 0.5))
-    half = math.pi * math.sqrt(MASS / 1e5)
-    for damping in (0.0, 100.0, 1e4):
-        scales = [half, *([20 * MASS / damping] if damping else [])]
-        friction = sp.BristleFriction(0.4, 0.3, 1e5, damping)
-        assert friction.slip_time(MASS, 50.0, 1.0) == pytest.approx(min(scales), rel=1e-14)
+COULOMB, SOFT = sp.CoulombFriction(0.4, 0.3, 1e-3, 1e-2), sp.BristleFriction(0.4, 0.3, 0.5)
+LOAD, DISC, STIFF = 50.0, 5e-3, sp.MindlinFriction(0.4, 0.4, *RUBBER).tangential_stiffness(5e-3)
 
 
-def test_bristles_of_mindlin_follow_the_disc() -> None:
-    disc, load = 5e-3, 50.0
-    plain = sp.MindlinFriction(0.4, 0.4, *RUBBER)
-    stiffness = plain.tangential_stiffness(disc)
-    half = math.pi * math.sqrt(MASS / stiffness)
-    assert plain.slip_time(MASS, load, disc) == pytest.approx(half, rel=1e-14)
-    assert plain.slip_time(MASS, load, math.nan) == plain.slip_time(MASS, load, 0.0) == math.inf
-    for time in (1e-4, 1.0):
-        damped = sp.MindlinFriction(0.4, 0.4, *RUBBER, damping_time=time)
-        expected = min(half, 20 * MASS / (time * stiffness))
-        assert damped.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)
-    for speed in (1e-5, 10.0):
-        rolls = sp.MindlinFriction(0.4, 0.4, *RUBBER, rolling=0.02, rolling_speed=speed)
-        expected = min(half, 20 * MASS * speed / (1.5 * 0.02 * load))
-        assert rolls.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)
-        light = min(half, 20 * MASS * speed / (1.5 * 0.02 * 0.5))
-        assert rolls.slip_time(MASS, 0.5, disc) == pytest.approx(light, rel=1e-14)
-        assert rolls.slip_time(MASS, 0.0, disc) == pytest.approx(half, rel=1e-14)
+def mindlin(**more) -> sp.MindlinFriction:
+    return sp.MindlinFriction(0.4, 0.4, *RUBBER, **more)
+
+
+# Coulomb: mu (3 - s^2) s / 2 with s = v / v_static, a damper of 1.5 mu N / v_static. Bristles ring
+# or decay, those of Mindlin with the stiffness of the disc.
+SLIPS = [
+    (COULOMB, LOAD, 1.0, 20 * MASS * 1e-3 / (1.5 * 0.4 * LOAD)),
+    (COULOMB, LOAD / 100, 1.0, 20 * MASS * 1e-3 / (1.5 * 0.4 * LOAD / 100)),
+    (COULOMB, 0.0, 1.0, math.inf),
+    (COULOMB, -1.0, 1.0, math.inf),
+    (sp.CoulombFriction(0.0, 0.0), LOAD, 1.0, math.inf),
+    (SOFT, LOAD, 1.0, half(0.5)),
+    (sp.BristleFriction(0.4, 0.3, 1e5), LOAD, 1.0, half(1e5)),
+    (sp.BristleFriction(0.4, 0.3, 1e5, 100.0), LOAD, 1.0, half(1e5)),
+    (sp.BristleFriction(0.4, 0.3, 1e5, 1e4), LOAD, 1.0, 20 * MASS / 1e4),
+    (mindlin(), LOAD, DISC, half(STIFF)),
+    (mindlin(), LOAD, math.nan, math.inf),
+    (mindlin(), LOAD, 0.0, math.inf),
+    *(
+        (mindlin(damping_time=time), LOAD, DISC, min(half(STIFF), 20 * MASS / (time * STIFF)))
+        for time in (1e-4, 1.0)
+    ),
+    *(
+        (
+            mindlin(rolling=0.02, rolling_speed=speed),
+            load,
+            DISC,
+            min(half(STIFF), 20 * MASS * speed / (1.5 * 0.02 * load) if load else math.inf),
+        )
+        for speed in (1e-5, 10.0)
+        for load in (LOAD, 0.5, 0.0)
+    ),
+]
+
+
+@pytest.mark.parametrize(("friction", "load", "disc", "expected"), SLIPS)
+def test_time_scale_of_a_slip(friction, load: float, disc: float, expected: float) -> None:
+    assert friction.slip_time(MASS, load, disc) == pytest.approx(expected, rel=1e-14)

@@ -1,11 +1,12 @@
-"""Walks of a sphere over a surface: where its elastic potential jumps."""
+"""Walks of a sphere over a surface: where its contacts change, and where its potential jumps."""
 
-from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from sphshell_pin import Shell
+from tests.contact.helpers import energy
 
 # Two centres this share of the radius apart are on two sides of a border of regions.
 WIDTH = 1e-12
@@ -37,51 +38,43 @@ def steepest(look, start, end, width: float):
     return narrowed(look, start, end, width, goes_left)
 
 
-@dataclass
-class State:
-    """What a sphere meets: its potential (law depth^1.5), the sizes of the forces, and the terms
-    by element, feature and weight."""
-
-    energy: float
-    size: float
-    label: list[tuple[int, int, float]]
-    point: np.ndarray
+def label(contacts) -> list[tuple[int, int, float]]:
+    """What the contacts are with: a change of it is the passing of some border."""
+    terms = contacts.terms
+    columns = (column.tolist() for column in (terms.element, terms.feature, terms.weight))
+    return sorted(zip(*columns, strict=True))
 
 
-def state(shell: Shell, method: str, center: np.ndarray, radius: float) -> State:
-    found = shell.contacts(center, radius, method).terms
-    share, weight = found.depth / radius, found.weight
-    columns = (found.element, found.feature, weight)
-    label = sorted(zip(*(column.tolist() for column in columns), strict=True))
-    energy = float(weight @ share**2.5) / 2.5
-    return State(energy, float(np.abs(weight) @ share**1.5), label, found.point)
-
-
-def jumps(shell, method, path, radius=1.0, limit=1e-9):
-    """Places where the potential jumps by more than `limit` of itself, with the share by which it
-    does, and the states on both sides."""
+def borders(find, start, end, width: float) -> list[list[np.ndarray]]:
+    """All places between two centres where what `find` finds changes: pairs `width` apart."""
     found = []
-
-    def look(center):
-        return state(shell, method, center, radius)
-
-    for first, end in pairwise(path):
-        start, here, last = first, look(first), look(end)
-        for _ in range(60):  # every border between the two
-            if here.label == last.label:
-                break
-            low, high, before, after = narrowed(
-                look, start, end, WIDTH * radius, lambda a, b, _: b.label != a.label
-            )
-            allowed = max(before.size, after.size) * np.linalg.norm(high - low) / radius
-            lost = abs(after.energy - before.energy) - allowed
-            if lost > limit * max(before.energy, after.energy):
-                found.append((low, lost / max(before.energy, after.energy), before, after))
-            start, here = high, after
+    while len(found) < 60:
+        *pair, first, last = narrowed(
+            lambda center: label(find(center)), start, end, width, lambda a, b, _: a != b
+        )
+        if first == last:
+            break
+        found.append(pair)
+        start = pair[1]
     return found
 
 
-def paths(shell, count, steps, radius=1.0, step=0.02, seed=0):
+def jumps(shell, method, path, radius=1.0, limit=1e-9) -> list[tuple[list[float], float]]:
+    """Places where the potential of depth^1.5 jumps by more than `limit` of itself, and the share
+    by which it does."""
+    found, find = [], partial(shell.contacts, radius=radius, method=method)
+    for ends in pairwise(path):
+        for low, high in borders(find, *ends, WIDTH * radius):
+            sides = [find(low), find(high)]
+            size = max(np.abs(one.terms.weight) @ one.terms.depth**1.5 for one in sides)
+            before, after = map(energy, sides)
+            lost = abs(after - before) - size * np.linalg.norm(high - low)
+            if lost > limit * max(before, after):
+                found.append((low.tolist(), lost / max(before, after)))
+    return found
+
+
+def paths(shell: Shell, count: int, steps: int, radius: float = 1.0, step=0.02, seed=0):
     """Centres (steps, 3) along straight lines: by turns along the surface at some depth, and across
     it in any direction."""
     rng = np.random.default_rng(seed)

@@ -190,12 +190,12 @@ OFFSET, OTHER_OFFSET = (0.01, -0.02, 0.03), (-0.03, 0.01, 0.02)
 ONE, TWO = sp.Sphere(R, "one", OFFSET), sp.Sphere(OTHER, "two", OTHER_OFFSET)
 
 
-def two_bodies() -> pin.Model:
-    """Free bodies "one" and "two", no gravity."""
+def two_bodies(inertia: pin.Inertia | None = None) -> pin.Model:
+    """Free bodies "one" and "two", no gravity; of the same inertia where one is given."""
     model = models.empty(0.0)
     lump = pin.Inertia(2.0, np.array([0.02, -0.03, 0.01]), np.diag([0.03, 0.02, 0.04]))
-    models.add_body(model, "one", pin.JointModelFreeFlyer())
-    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=lump)
+    models.add_body(model, "one", pin.JointModelFreeFlyer(), inertia=inertia)
+    models.add_body(model, "two", pin.JointModelFreeFlyer(), inertia=inertia or lump)
     return model
 
 
@@ -217,6 +217,11 @@ def in_touch(seed: int, depth: float = 0.004, spin: float = 20.0) -> tuple[Array
     one.translation = two * np.array(OTHER_OFFSET) + way - one.rotation @ np.array(OFFSET)
     v = np.concatenate([rng.normal(size=3), spin * rng.normal(size=3)] * 2)
     return np.concatenate([pin.SE3ToXYZQUAT(one), pin.SE3ToXYZQUAT(two)]), v
+
+
+def balls(law: str, friction: str, seed: int = 3, spin: float = 20.0) -> State:
+    """The two spheres in touch."""
+    return two_spheres(LAWS[law], FRICTIONS[friction]), *in_touch(seed, spin=spin)
 
 
 def stuck() -> tuple[State, sp.results.SceneState]:

@@ -13,6 +13,7 @@ from sphshell_pin import CartesianImpedance, JointPD, Scene, Simulation, Sphere
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.errors import FrameNotFound, InvalidParameter, NameNotFound, SphshellError
+from sphshell_pin.patches import ShellTaxels
 from tests.models import ARM_Q, LAW, add_body, arm, ball, empty, free_q, on_plate, plate
 
 BALL, HIGH, NAN = Sphere(0.05, "ball"), free_q([0, 0, 1]), float("nan")
@@ -81,6 +82,39 @@ def spheres(given):
         scene.add_contacts(given, plate(), law=LAW)
 
 
+def jointed(model=None, **parts):
+    Scene(model or arm(), joints=sp.JointComponents(**parts))
+
+
+def mindlin(**more):
+    return sp.MindlinFriction(0.5, 0.4, 1e6, 0.4, **more)
+
+
+def source(law=LAW, friction=None):
+    Scene(ball()).add_contact_source(lambda i, j: None, "ball", "universe", law, friction)
+
+
+def wrench(friction, *state):
+    still = pin.Motion.Zero()
+    sp.contact_wrench(np.zeros(3), np.eye(3)[2], 1e-4, still, still, LAW, friction, *state)
+
+
+def torque(**more):
+    return sp.JointTorqueSensor(name="a", joint="ball_joint", **more)
+
+
+def switch(contact="b", **more):
+    return sp.ContactSwitch(name="a", contact=contact, threshold=1, **more)
+
+
+def sensing(sensors):
+    Simulation(Scene(ball()), None, sensors)
+
+
+def derive(tau):
+    Scene(arm()).dynamics_derivatives(ARM_Q, np.zeros(3), tau)
+
+
 def on_sphere(**more):
     add(shell=Sphere(0.1, "universe"), **more)
 
@@ -103,6 +137,8 @@ def without_a_frame(late):
     Scene(model, lock=["hinge"])
 
 
+RANGE = sp.JointLimits(-1.0, 1.0, LAW)
+NAMES = np.array(["a", "b"])
 ZEROS, FORGOT = [0, 0, 0], r"did you forget \(\)"
 Call = Callable[[], object]
 REFUSED: list[tuple[str, Call]] = [
@@ -115,6 +151,7 @@ REFUSED: list[tuple[str, Call]] = [
     ("sphere", lambda: add(sphere=Sphere)),
     ("shell", lambda: add(shell="x.stl")),
     ("law", lambda: add(law="impact")),
+    ("law = None must be a law of this package", lambda: add(law=None)),
     ("friction", lambda: add(friction=0.3)),
     ("friction", lambda: add(friction=sp.CoulombFriction)),
     ("frame", lambda: add(frame=None)),
@@ -167,6 +204,10 @@ REFUSED: list[tuple[str, Call]] = [
     ("q has shape", lambda: on_plate(ball(), LAW).external_forces(np.zeros(6))),
     ("v has shape", lambda: on_plate(ball(), LAW).external_forces(HIGH, np.zeros(5))),
     ("q has shape", lambda: run(np.zeros(6))),
+    ("q = .* must hold 7 numbers", lambda: at(np.ma.masked_equal(HIGH, 0.0))),
+    ("scale = .* makes the shell too large", lambda: plate().transformed(1e308)),
+    ("name = .* must be a name", lambda: on_plate(ball(), LAW).replace_pair(NAMES, law=LAW)),
+    ("pair = .* must be a name", lambda: ShellTaxels(NAMES)),
     ("v has shape", lambda: run(v=np.zeros(7))),
     ("q = .* finite", lambda: run(HIGH * np.nan)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),
@@ -179,6 +220,32 @@ REFUSED: list[tuple[str, Call]] = [
     ("anchor_world", lambda: pull("ball", ZEROS, [0, 0, np.inf], 1.0)),
     ("stiffness", lambda: pull("ball", ZEROS, ZEROS, -1.0)),
     ("damping", lambda: pull("ball", ZEROS, ZEROS, 1.0, NAN)),
+    ("damping.one_joint.*negative", lambda: jointed(damping={"one_joint": -1.0})),
+    ("damping.*one number or 1", lambda: jointed(damping={"one_joint": [1.0, 2.0]})),
+    ("effort.*lower <= 0", lambda: jointed(effort={"one_joint": (1.0, 5.0)})),
+    ("limits.one_joint.*JointLimits", lambda: jointed(limits={"one_joint": 3})),
+    ("friction.*must map joint names", lambda: jointed(friction=1.0)),
+    ("is a joint without a range", lambda: jointed(ball(), limits={"ball_joint": RANGE})),
+    ("lower below upper", lambda: sp.JointLimits(1.0, 1.0, LAW)),
+    ("lower, upper = .* must be a range", lambda: sp.JointLimits("x", 1.0, LAW)),
+    *(
+        (r"rings = .* must be a whole number in \[1, 8\]", lambda one=one: mindlin(rings=one))
+        for one in (0, 9, 2.0, True)
+    ),
+    ("needs a sphere, and a contact source has none", lambda: source(friction=mindlin())),
+    ("contact source", lambda: source(law=sp.FoundationLaw(1e4, 0.5))),
+    ("must be a BristleState, which holds", lambda: wrench(mindlin())),
+    ("rings = 2 must be 1", lambda: wrench(mindlin(rings=2), sp.BristleState(0.05))),
+    ("must be the sphere's, of Mindlin's", lambda: wrench(mindlin(), sp.BristleState())),
+    (r"sensors\[1\].name = 'a' is taken", lambda: sensing([torque(), torque()])),
+    ("must be a list of sensors", lambda: sensing(torque())),
+    (r"sensors\[0\] = 'wrist' must be a sensor", lambda: sensing(["wrist"])),
+    ("seed = 1.5 must be a whole number", lambda: torque(seed=1.5)),
+    ("must be one of the two", lambda: switch(contact=None)),
+    ("release = 2.0 must not be above threshold = 1", lambda: switch(release=2)),
+    ("must be 'patch' or 'torque'", lambda: run(record=["force"])),
+    ("tau has shape", lambda: run(controller=lambda t, q, v, c: np.zeros(5), control_dt=1e-2)),
+    *(("tau", lambda one=one: derive(one)) for one in (np.zeros(4), np.full(3, NAN), "heavy")),
 ]
 
 
@@ -200,6 +267,7 @@ def test_a_wrong_argument_is_named(words: str, call: Call) -> None:
         (NameNotFound, "facets", lambda: change(method="x")),
         (NameNotFound, "facets", lambda: add(method=5)),
         (NameNotFound, "two_joint", lambda: Scene(arm(), lock=["elbow"])),
+        (NameNotFound, "two_joint", lambda: jointed(damping={"elbow": 1.0})),
     ],
 )
 def test_an_unknown_name_lists_the_valid_ones(error, valid: str, call: Call) -> None:
@@ -260,8 +328,3 @@ def test_geometry_stays_on_its_joint_whatever_the_frames_are_called() -> None:
     geometry.addCollisionPair(pair)
     (made,) = Scene.from_geometry(model, geometry, LAW).pairs
     assert made.placement_i.isApprox(place)
-
-
-def test_a_contact_needs_a_law() -> None:
-    with pytest.raises(InvalidParameter, match="law = None must be a law of this package"):
-        Scene(ball()).add_contact(BALL, plate())

@@ -1,6 +1,5 @@
 """Compiled robots: the same motion as Pinocchio's, for all kinds of joints that are compiled."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -40,17 +39,14 @@ def tree(*joints: pin.JointModel, branches: bool = True) -> pin.Model:
     return model
 
 
+PLAIN = ("FreeFlyer", "RX", "RUBZ", "Spherical", "Planar", "Translation", "PZ")
+
+
 def all_kinds() -> pin.Model:
     axis = np.array([0.36, 0.48, 0.8])
     return tree(
-        pin.JointModelFreeFlyer(),
-        pin.JointModelRX(),
+        *(getattr(pin, f"JointModel{kind}")() for kind in PLAIN),
         pin.JointModelHY(0.3),
-        pin.JointModelRUBZ(),
-        pin.JointModelSpherical(),
-        pin.JointModelPlanar(),
-        pin.JointModelTranslation(),
-        pin.JointModelPZ(),
         pin.JointModelPrismaticUnaligned(axis),
         pin.JointModelRevoluteUnaligned(axis),
         pin.JointModelHelicalUnaligned(axis, -0.2),
@@ -69,26 +65,16 @@ def touching(model: pin.Model, q: Array, compiled: bool) -> sp.Scene:
     frame, data, radius = model.frames[model.nframes - 1], model.createData(), 0.05
     pin.framesForwardKinematics(model, data, q)
     below = data.oMf[model.nframes - 1].translation - [0.0, 0.0, 0.9 * radius]
-    scene.add_contact(
-        sp.Sphere(radius, frame=frame.name),
-        sp.Shell(*meshes.grid_plate(4, 4, 2.0)),
-        placement=pin.SE3(np.eye(3), below),
-        law=sp.HuntCrossleyLaw(1e4, 1.5, 0.1),
-        friction=sp.BristleFriction(0.5, 0.4, 1e3, 1.0, 1e-2),
-    )
+    place, plate = pin.SE3(np.eye(3), below), sp.Shell(*meshes.grid_plate(4, 4, 2.0))
+    law, friction = sp.HuntCrossleyLaw(1e4, 1.5, 0.1), sp.BristleFriction(0.5, 0.4, 1e3, 1.0, 1e-2)
+    scene.add_contact(sp.Sphere(radius, frame.name), plate, "universe", place, law, friction)
     return scene
 
 
-MODELS: dict[str, Callable[[], pin.Model]] = {
-    "all kinds": all_kinds,
-    "mimics": lambda: gripper()[0],
-}
-
-
-@pytest.mark.parametrize("name", MODELS)
-def test_runs_rollouts_and_accelerations_are_those_of_pinocchio(name: str) -> None:
+@pytest.mark.parametrize("make", [all_kinds, lambda: gripper()[0]], ids=["all kinds", "mimics"])
+def test_runs_rollouts_and_accelerations_are_those_of_pinocchio(make) -> None:
     """Loading has compared them to 1e-12 at states with and without forces from outside."""
-    model = MODELS[name]()
+    model = make()
     q = pin.integrate(model, pin.neutral(model), np.full(model.nv, 0.1))
     ours, judge = (touching(model, q, compiled) for compiled in (True, False))
     assert ours.bind_joints() is not None

@@ -1,13 +1,14 @@
 """Contacts as constraints for Pinocchio's ADMM: rolling, sliding, and what they state."""
 
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter
-from tests import meshes
-from tests.models import ball
+from tests.models import ball, on_shell, square
 
 RADIUS, MASS, DT = 0.02, 0.26, 1e-3
 
@@ -16,13 +17,9 @@ def ball_on_a_slope(angle: float, mu: float | None):
     """A steel ball that rests on a slope, turned in its joint, and its configuration."""
     model = ball(9.81, MASS, RADIUS)
     law, turn = sp.HertzLaw.of("steel", "steel"), pin.exp3(np.array([0.0, angle, 0.0]))
-    plate = sp.Shell(*meshes.grid_plate(size=2.0, quads=True))
     friction = None if mu is None else sp.CoulombFriction(mu, mu)
-    scene = sp.Scene(model)
     placement = pin.SE3(turn, np.array([0.1, 0.2, 0.3]))
-    scene.add_contact(
-        sp.Sphere(RADIUS, "ball"), plate, placement=placement, law=law, friction=friction
-    )
+    scene = on_shell(model, square(), law, friction, radius=RADIUS, placement=placement)
     depth = scene.pairs[0].plane_law.depth_at(MASS * 9.81 * np.cos(angle))
     q = pin.neutral(model)
     q[:3] = placement.translation + (RADIUS - depth) * turn[:, 2]
@@ -48,10 +45,8 @@ def solved(scene: sp.Scene, q) -> np.ndarray:
     delassus = pin.DelassusOperatorDense(jacobian @ np.linalg.solve(mass, jacobian.T))
     settings, result = pin.ADMMSolverSettings(), pin.ADMMSolverResult()
     settings.max_iterations = 10_000
-    for name in ("absolute_feasibility_tol", "absolute_complementarity_tol"):
-        setattr(settings, name, 1e-14)
-    for name in ("relative_feasibility_tol", "relative_complementarity_tol"):
-        setattr(settings, name, 1e-14)
+    for kind, of in product(("absolute", "relative"), ("feasibility", "complementarity")):
+        setattr(settings, f"{kind}_{of}_tol", 1e-14)
     solver = pin.ADMMConstraintSolver()
     assert solver.solve(delassus, jacobian @ free, models, datas, settings, result)
     return np.array(result.retrieveConstraintImpulses()) / DT

@@ -5,9 +5,8 @@ import pinocchio as pin
 import pytest
 
 from sphshell_pin import CoulombFriction, RungeKutta4, Scene, SemiImplicitEuler, Simulation
-from sphshell_pin.dynamics.scene.sides import SourceSide, SphereSide
 from sphshell_pin.errors import SphshellError
-from tests.models import add_body, ball, empty, free_q, linear_law, on_plate
+from tests.models import add_body, ball, empty, free_q, linear_law, on_plate, pose_of
 
 RADIUS = 0.05
 LAW = linear_law(4000.0, 20.0)
@@ -23,8 +22,8 @@ def plate_points(pose_i: pin.SE3, pose_j: pin.SE3):
     return (pose_i.translation - height * up)[None], up[None], np.array([RADIUS - height])
 
 
-def by_source(model: pin.Model, find=plate_points, friction=FRICTION) -> Scene:
-    scene = Scene(model)
+def by_source(find=plate_points, friction=FRICTION) -> Scene:
+    scene = Scene(ball())
     scene.add_contact_source(find, "ball", "universe", LAW, friction, name="mine")
     return scene
 
@@ -36,7 +35,7 @@ START = free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20
 @pytest.mark.parametrize("integrator", [SemiImplicitEuler, RungeKutta4])
 def test_a_source_that_mimics_the_plate_gives_the_same_run(integrator, friction) -> None:
     """Ball that bounces and skids: rounding apart, shell and source tell the same story."""
-    scenes = on_plate(ball(), LAW, friction), by_source(ball(), friction=friction)
+    scenes = on_plate(ball(), LAW, friction), by_source(friction=friction)
     a, b = (Simulation(s, integrator(dt=2e-4)).run(*START, 0.3) for s in scenes)
     assert np.array_equal(a.t, b.t)
     assert b.q == pytest.approx(a.q, abs=1e-10)
@@ -50,44 +49,31 @@ def test_a_source_that_mimics_the_plate_gives_the_same_run(integrator, friction)
 def test_source_between_two_moving_bodies() -> None:
     """Equal and opposite, at one point, with the poses of the frames it was given."""
     model = empty(gravity=0.0)
-    frames = [pin.SE3.Random() for _ in range(2)]
-    for name, frame in zip(("one", "two"), frames, strict=True):
-        add_body(model, name, pin.JointModelFreeFlyer(), frame=frame)
+    for name in ("one", "two"):
+        add_body(model, name, pin.JointModelFreeFlyer(), frame=pin.SE3.Random())
     q = pin.integrate(model, pin.neutral(model), np.random.default_rng(0).normal(size=12))
-    v = np.random.default_rng(1).normal(size=12)
     point, normal = np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8])
     seen = []
 
-    def find(pose_i: pin.SE3, pose_j: pin.SE3):
-        seen.append((pin.SE3(pose_i), pin.SE3(pose_j)))
+    def find(*poses: pin.SE3):
+        seen.append([pin.SE3(pose) for pose in poses])
         return np.stack([point, -point]), np.stack([normal, normal]), np.array([0.01, 0.02])
 
     scene = Scene(model)
     scene.add_contact_source(find, "one", "two", linear_law(1000.0), None, name="gears")
-    fext = scene.external_forces(q, v)
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
+    fext = scene.external_forces(q, np.random.default_rng(1).normal(size=12))
     for pose, name in zip(seen[0], ("one", "two"), strict=True):
-        assert pose.isApprox(data.oMf[model.getFrameId(name)], 1e-12)
-    world = [data.oMi[k].act(fext[k]).vector for k in (1, 2)]
+        assert pose.isApprox(pose_of(model, q, name), 1e-12)
+    on_one, on_two = (
+        pose_of(model, q, f"{name}_joint").act(force).vector
+        for name, force in zip(("one", "two"), list(fext)[1:], strict=True)
+    )
     torque = np.cross(point, 10.0 * normal) + np.cross(-point, 20.0 * normal)
-    assert world[0] == pytest.approx(np.concatenate([30.0 * normal, torque]), abs=1e-11)
-    assert world[1] == pytest.approx(-world[0], abs=1e-12)
-    contacts = scene.contacts(q, v)
+    assert on_one == pytest.approx(np.concatenate([30.0 * normal, torque]), abs=1e-11)
+    assert on_two == pytest.approx(-on_one, abs=1e-12)
+    contacts = scene.contacts(q)
     assert contacts.point_world == pytest.approx(np.stack([point, -point]), abs=1e-14)
     assert contacts.normal_force == pytest.approx([10.0, 20.0])
-
-
-def test_source_beside_a_shell() -> None:
-    """Both kinds of pairs in one scene: forces add."""
-    q, v = free_q([0.0, 0.0, RADIUS - 0.002]), np.array([0.5, 0.0, -0.1, 0.0, 5.0, 0.0])
-    shell, source = on_plate(ball(), LAW, FRICTION), by_source(ball())
-    both = on_plate(ball(), LAW, FRICTION)
-    both.add_contact_source(plate_points, "ball", "universe", LAW, FRICTION, name="mine")
-    one, two, sum_ = (s.external_forces(q, v)[1].vector for s in (shell, source, both))
-    assert one == pytest.approx(two, abs=1e-10)
-    assert sum_ == pytest.approx(one + two, abs=1e-10)
-    assert [type(p.side_i) for p in both.pairs] == [SphereSide, SourceSide]
 
 
 def test_an_error_in_the_callable_comes_through() -> None:
@@ -96,7 +82,7 @@ def test_an_error_in_the_callable_comes_through() -> None:
     def broken(pose_i, pose_j):
         raise RuntimeError("teeth fell out")
 
-    scene = by_source(ball(), broken)
+    scene = by_source(broken)
     with pytest.raises(RuntimeError, match="teeth fell out") as caught:
         scene.external_forces(*START)
     (note,) = caught.value.__notes__
@@ -106,21 +92,23 @@ def test_an_error_in_the_callable_comes_through() -> None:
         Simulation(scene, SemiImplicitEuler(dt=1e-3)).run(*START, 0.01)
 
 
+UP = np.array([[0.0, 0.0, 1.0]])
+
+
 @pytest.mark.parametrize(
     "answer",
     [
         (np.zeros((1, 2)), np.zeros((1, 3)), np.zeros(1)),
-        (np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros(1)),
-        (np.full((1, 3), np.nan), np.array([[0.0, 0.0, 1.0]]), np.array([0.01])),
+        (np.zeros((2, 3)), np.tile(UP, (2, 1)), np.zeros(1)),
+        (np.full((1, 3), np.nan), UP, np.array([0.01])),
         None,
         (np.zeros((1, 3)),),
-        (np.zeros(6), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros(2)),
-        (np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], 2), np.zeros(2)),
-        (np.zeros((2, 3)), np.tile([0.0, 0.0, 1.0], (2, 1)), np.zeros((1, 2))),
-        (np.zeros((1, 3), complex), np.array([[0.0, 0.0, 1.0]]), np.zeros(1)),
+        (np.zeros(6), np.tile(UP, (2, 1)), np.zeros(2)),
+        (np.zeros((2, 3)), np.tile(UP[0], 2), np.zeros(2)),
+        (np.zeros((2, 3)), np.tile(UP, (2, 1)), np.zeros((1, 2))),
+        (np.zeros((1, 3), complex), UP, np.zeros(1)),
     ],
 )
 def test_a_wrong_answer_is_named(answer) -> None:
-    scene = by_source(ball(), lambda pose_i, pose_j: answer)
     with pytest.raises(SphshellError, match="mine"):
-        scene.external_forces(*START)
+        by_source(lambda pose_i, pose_j: answer).external_forces(*START)

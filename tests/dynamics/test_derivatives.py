@@ -1,6 +1,6 @@
 """Derivatives of contact forces, accelerations, rows and bristles' rates, against differences."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import product
 
@@ -18,7 +18,8 @@ from tests.dynamics.test_external_forces import CASES
 from tests.dynamics.test_mimic import CASES as MIMIC
 from tests.models import ARM_Q, TURNING, free_q
 
-IMPACT = scenes.LAWS["impact"]
+LAWS, FRICTIONS = scenes.LAWS, scenes.FRICTIONS
+IMPACT = LAWS["impact"]
 WHERE: dict[str, Callable[..., scenes.State]] = {
     "on a plate": scenes.on_plate,
     "in a bowl": scenes.in_bowl,
@@ -42,61 +43,44 @@ def on_elements() -> scenes.State:
     return scene, scenes.turned(free_q([0.3, 0.1, 0.95]), 1), np.full(6, 0.1)
 
 
-CHAINS = {" ".join(map(str, one)): partial(scenes.on_chain, *one) for one in CASES[::4]}
+Scenes = dict[str, Callable[[], scenes.State]]
+CHAINS: Scenes = {" ".join(map(str, one)): partial(scenes.on_chain, *one) for one in CASES[::4]}
 CHAINS |= {
     f"{i} {j} {tree}": partial(scenes.on_chain, i, j, tree, seed)
     for joint, tree in product(TURNING, ("apart", "siblings", "chain"))
     for seed, (i, j) in enumerate([(joint, "prismatic"), ("spherical", joint), (joint, joint)])
 }
 NOT_IN_PINOCCHIO = {f"JointModel{name}" for name in ("SphericalZYX", "Universal", "Composite")}
-SCENES: dict[str, Callable[[], scenes.State]] = {
-    **{
-        f"{where}, {law}": partial(WHERE[where], scenes.LAWS[law], scenes.COULOMB)
-        for where, law in product(("in a bowl", "moving"), scenes.LAWS)
-    },
-    **{
-        f"{where}, {name}": partial(WHERE[where], IMPACT, scenes.FRICTIONS[name])
-        for where, name in product(
-            ("on a plate", "in a bowl", "moving", "in a groove"), scenes.FRICTIONS
-        )
-    },
-    **{
-        f"{name}, {friction}": partial(
-            scenes.on_surface, name, IMPACT, scenes.FRICTIONS[friction], seed
-        )
-        for name in SURFACES
-        for seed, friction in enumerate(scenes.FRICTIONS)
-    },
+CORNERS = [[1.2, 1.15, 0.1], [1.2, 1.2, 1.1], [0.2, 0.3, 1.9]]
+PLACES = ("on a plate", "in a bowl", "moving", "in a groove")
+SEEDS = {name: seed for seed, name in enumerate(FRICTIONS)}
+DISCS = ("soft finger", "mindlin", "rings")
+
+
+def family(make: Callable[..., scenes.State], *axes: Iterable[object]) -> Scenes:
+    """The scenes of all combinations of what the axes list, by their names."""
+    return {", ".join(map(str, one)): partial(make, *one) for one in product(*axes)}
+
+
+def somewhere(where: str, law: str, friction: str = "coulomb", *more: int) -> scenes.State:
+    return WHERE[where](LAWS[law], FRICTIONS[friction], *more)
+
+
+def on_facets(name: str, seed: int) -> scenes.State:
+    return scenes.on_surface(name, IMPACT, scenes.COULOMB, seed, method="facets")
+
+
+SCENES: Scenes = {
+    **family(somewhere, ("in a bowl", "moving"), LAWS),
+    **family(lambda where, slip: somewhere(where, "impact", slip), PLACES, FRICTIONS),
+    **family(lambda name, slip: somewhere(name, "impact", slip, SEEDS[slip]), SURFACES, FRICTIONS),
     # Mindlin's disc follows the curvature of the shell, with its slopes.
-    **{
-        f"{name}, hertz, {friction}": partial(
-            scenes.on_surface, name, HERTZ, scenes.FRICTIONS[friction]
-        )
-        for name, friction in product(ELLIPSES, ("soft finger", "mindlin", "rings"))
-    },
-    **{
-        f"{name}, facets {seed}": partial(
-            scenes.on_surface, name, IMPACT, scenes.COULOMB, seed, method="facets"
-        )
-        for name, seed in product(ELLIPSES, range(2))
-    },
-    **{
-        f"corner {k}, {method}": partial(at_corner, center, method)
-        for k, center in enumerate([[1.2, 1.15, 0.1], [1.2, 1.2, 1.1], [0.2, 0.3, 1.9]])
-        for method in ("smooth", "facets")
-    },
-    **{
-        f"two spheres, {law}, {friction}": lambda law=law, friction=friction: (
-            scenes.two_spheres(scenes.LAWS[law], scenes.FRICTIONS[friction]),
-            *scenes.in_touch(3),
-        )
-        for law, friction in product(("impact", "hertz, two materials"), scenes.FRICTIONS)
-    },
+    **family(lambda at, _, slip: WHERE[at](HERTZ, FRICTIONS[slip]), ELLIPSES, ("hertz",), DISCS),
+    **family(on_facets, ELLIPSES, (0, 1)),
+    **family(lambda k, method: at_corner(CORNERS[k], method), range(3), ("smooth", "facets")),
+    **family(scenes.balls, ("impact", "hertz, two materials"), FRICTIONS),
     **CHAINS,
-    **{
-        f"{name} {seed}": partial(scenes.mimicking, name, seed)
-        for name, seed in product(MIMIC, (3, 4))
-    },
+    **family(scenes.mimicking, MIMIC, (3, 4)),
     # In a stop, with damping, armature and dry friction; ARM_Q is 0.1 rad beyond the range.
     "joint components": partial(scenes.in_bowl, IMPACT, scenes.COULOMB, joints=scenes.STOPS),
     "elements": on_elements,
@@ -151,29 +135,20 @@ def test_scenes_touch_as_they_are_meant_to() -> None:
     assert SCENES["locked joint"]()[0].model.nv == 2
 
 
-def test_forces_of_several_pairs_add_up() -> None:
-    scene, q, v = SCENES["two pairs"]()
-    scene.replace_pair("second", law=IMPACT, friction=scenes.COULOMB)
-    testing.assert_forces_balance(scene, q, v)
-
-
 @pytest.mark.parametrize(("friction", "tolerance"), [("none", 1e-6), ("coulomb", 1e-5)])
 def test_a_cluster_shown_as_one(friction: str, tolerance: float) -> None:
     """With friction it acts as one contact, right but for the square of the normals' angle."""
     shell = sp.Shell(*meshes.v_groove(np.radians(0.1), size=8.0, cells=2), crease_angle=1e-5)
-    scene = scenes.free_ball(shell, friction=scenes.FRICTIONS[friction])
+    scene = scenes.free_ball(shell, friction=FRICTIONS[friction])
     found = shell.contacts(np.array([4e-4, 0.3, 0.97]), 1.0)
     assert (found.weight.tolist(), found.terms.weight.tolist()) == ([1.0], [1.0, 1.0, -1.0])
     assert_derivatives(scene, free_q([4e-4, 0.3, 0.97]), np.full(6, 0.1), tolerance)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("in a bowl, impact", "moving, hunt-crossley", "two spheres, impact, mindlin"),
-        *("two pairs", "in a groove, coulomb"),
-    ],
-)
+ROWS = ["in a bowl, impact", "moving, hunt-crossley", "impact, mindlin", "two pairs"]
+
+
+@pytest.mark.parametrize("name", [*ROWS, "in a groove, coulomb"])
 def test_derivatives_of_rows(name: str) -> None:
     assert_rows(*SCENES[name]())
 
@@ -213,7 +188,7 @@ def test_rates_of_chains_of_joints(name: str) -> None:
 @pytest.mark.parametrize("where", [one for one in WHERE if one != "in a bowl"])
 def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
     """On curved shells and edges how the turning of normals changes is left out."""
-    scene, q, v = WHERE[where](IMPACT, friction=scenes.FRICTIONS[friction])
+    scene, q, v = WHERE[where](IMPACT, friction=FRICTIONS[friction])
     curved = where == "in a groove" or where in SURFACES
     turning = stretch * (30 if "rings" in friction else 1) if curved else 1e-6
     step = 1e-7 if where == "in a groove" else 1e-6
@@ -222,28 +197,24 @@ def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
     )
 
 
-@pytest.mark.parametrize("friction", ["soft finger", "mindlin", "rings"])
-def test_rates_of_bristles_on_the_ellipses_of_hertz(friction: str) -> None:
-    for name in ELLIPSES:
-        scene, q, v = scenes.on_surface(name, HERTZ, scenes.FRICTIONS[friction])
-        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4), turning=1e-2)
+# A scene, its stretches [m], and how well its turning is known.
+ELSEWHERE = {
+    f"{name}, {slip}": (partial(scenes.on_surface, name, HERTZ, FRICTIONS[slip]), 1e-4, 1e-2)
+    for name, slip in product(ELLIPSES, DISCS)
+}
+ELSEWHERE |= {
+    f"two spheres, {slip}": (partial(scenes.balls, "impact", slip, 4, 2.0), 2e-6, turning)
+    for slip, turning in ((one, 0.3 if "rings" in one else 1e-2) for one in scenes.BRISTLES)
+}
+ELSEWHERE |= {name: (partial(scenes.mimicking, name), 1e-5, 1e-6) for name in MIMIC}
+ELSEWHERE["two pairs"] = SCENES["two pairs"], 1e-4, 1e-6
 
 
-@pytest.mark.parametrize("friction", scenes.BRISTLES)
-def test_rates_of_bristles_of_two_spheres(friction: str) -> None:
-    scene = scenes.two_spheres(IMPACT, scenes.FRICTIONS[friction])
-    turning = 0.3 if "rings" in friction else 1e-2
-    scenes.assert_rate_jacobian(
-        scene, *scenes.in_touch(4, spin=2.0), scenes.stretched(scene, 2e-6), turning=turning
-    )
-
-
-def test_rates_of_several_pairs_and_of_mimic_joints() -> None:
-    scene, q, v = SCENES["two pairs"]()
-    scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-4))
-    for name in MIMIC:
-        scene, q, v = scenes.mimicking(name)
-        scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, 1e-5))
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_rates_of_bristles_of_other_scenes(name: str) -> None:
+    make, stretch, turning = ELSEWHERE[name]
+    scene, q, v = make()
+    scenes.assert_rate_jacobian(scene, q, v, scenes.stretched(scene, stretch), turning=turning)
 
 
 def test_bristles_of_a_state() -> None:

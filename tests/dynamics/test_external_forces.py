@@ -1,5 +1,7 @@
 """External forces through ABA are J^T f of forces by plain vectors, for every joint type."""
 
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -38,24 +40,13 @@ class Case:
 
         base = add_body(model, "base", pin.JointModelRY(), inertia=inertia())
         parents = {"apart": (base, 0), "siblings": (base, base), "chain": (None, base)}[tree]
-        self.j = add_body(
-            model,
-            "shell_body",
-            (JOINTS | TURNING)[joint_j](),
-            parents[1],
-            placement=somewhere(),
-            inertia=inertia(),
-            frame=somewhere(),
-        )
-        self.i = add_body(
-            model,
-            "tip",
-            (JOINTS | TURNING)[joint_i](),
-            self.j if parents[0] is None else parents[0],
-            placement=somewhere(),
-            inertia=inertia(),
-            frame=somewhere(),
-        )
+
+        def add(name: str, joint: str, parent: int) -> int:
+            places = {"placement": somewhere(), "inertia": inertia(), "frame": somewhere()}
+            return add_body(model, name, (JOINTS | TURNING)[joint](), parent, **places)
+
+        self.j = add("shell_body", joint_j, parents[1])
+        self.i = add("tip", joint_i, self.j if parents[0] is None else parents[0])
         self.q = pin.integrate(model, pin.neutral(model), rng.uniform(-1, 1, model.nv))
         self.v = rng.normal(size=model.nv)
         self.tau = rng.normal(size=model.nv)
@@ -74,32 +65,18 @@ class Case:
             self.v = -self.v
             self.motions = [-motion for motion in self.motions]
         self.model, self.data = model, data
+        place = data.oMf[model.getFrameId("shell_body")].actInv(pose)
+        shell = Shell(*meshes.random_plate(50, seed=seed, slivers=False))
         self.scene = Scene(model)
-        self.scene.add_contact(
-            sphere=Sphere(RADIUS, frame="tip", offset=offset),
-            shell=Shell(*meshes.random_plate(50, seed=seed, slivers=False)),
-            frame="shell_body",
-            placement=data.oMf[model.getFrameId("shell_body")].actInv(pose),
-            law=ImpactLaw(K, E, C, D),
-            friction=FRICTION,
-            method="facets",
-        )
-        self.force = mechanics.force_on_i(
-            self.point,
-            self.normal,
-            DEPTH,
-            *self.motions,
-            normal_force=normal_force,
-            coefficient=coefficient,
-        )
+        more = {"law": ImpactLaw(K, E, C, D), "friction": FRICTION, "method": "facets"}
+        self.scene.add_contact(Sphere(RADIUS, "tip", offset), shell, "shell_body", place, **more)
+        forces = {"normal_force": normal_force, "coefficient": coefficient}
+        where = self.point, self.normal, DEPTH
+        self.force = mechanics.force_on_i(*where, *self.motions, **forces)
 
 
-CASES = [
-    (i, j, tree, seed)
-    for seed, (i, j, tree) in enumerate(
-        (i, j, tree) for i in JOINTS for j in JOINTS for tree in ("apart", "siblings", "chain")
-    )
-]
+TREES = ("apart", "siblings", "chain")
+CASES = [(*case, seed) for seed, case in enumerate(product(JOINTS, JOINTS, TREES))]
 
 
 @pytest.mark.parametrize(("joint_i", "joint_j", "tree", "seed"), CASES)

@@ -7,14 +7,13 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter
-from tests import differences, meshes
-from tests.contact.smooth.surfaces import shell_of
+from tests import meshes, models
 from tests.contact.smooth.test_sweeps_edges import edged
 from tests.dynamics import scenes
 from tests.dynamics.scenes import assert_rate_jacobian
-from tests.models import ball, free_q, on_plate, two_free_bodies, two_free_state
+from tests.dynamics.test_derivatives import assert_derivatives
+from tests.models import ball, free_q, on_plate
 
 KAPPA = 2e4  # modulus / thickness [Pa/m]
 LAW = sp.FoundationLaw(1e4, 0.5)
@@ -33,10 +32,6 @@ def test_plane_law() -> None:
     assert law.depth_at(law.normal_force(7e-4)) == pytest.approx(7e-4)
     with pytest.raises(InvalidParameter, match="on_plane"):
         LAW.normal_force(1e-3)
-    # Beyond the radius it only says that it cannot stop the sphere.
-    assert law.depth_of(10 * law.energy(0.01)) > 0.01
-    assert law.depth_at(10 * law.normal_force(0.01)) > 0.01
-    assert 0 < law.contact_time(0.05, 1.0) < 1
     damped = DAMPED.on_plane(1.0)
     assert damped.normal_force(0.1, -0.5) == pytest.approx(1.1 * damped.normal_force(0.1))
 
@@ -66,11 +61,6 @@ def test_rows_add_up() -> None:
     assert total.linear == pytest.approx(force, rel=1e-12)
 
 
-def test_action_and_reaction() -> None:
-    scene = two_free_bodies(sp.FoundationLaw(1e6, 0.05, 0.3), COULOMB)
-    testing.assert_wrenches_cancel(scene, *two_free_state())
-
-
 @pytest.mark.parametrize("spin", [0.05, 0.5, 5.0])
 def test_spinning_ball_feels_a_moment(spin: float) -> None:
     """Friction of every point by its own speed: the integral over the disc of overlap."""
@@ -97,42 +87,6 @@ def test_local_dissipation() -> None:
         assert scene.external_forces(q, v)[1].linear[2] == pytest.approx(
             share * elastic, abs=1e-9 * elastic
         )
-
-
-def torques(scene: sp.Scene, q, v, tau):  # type: ignore[no-untyped-def]
-    """The contact forces as joint torques (nv,)."""
-    model, zero = scene.model, np.zeros(scene.model.nv)
-    data = model.createData()
-    free = np.array(pin.rnea(model, data, q, zero, zero))
-    return free - pin.rnea(model, data, q, zero, zero, scene.external_forces(q, v))
-
-
-def assert_derivatives(scene: sp.Scene, q, v) -> None:  # type: ignore[no-untyped-def]
-    """By q and v; where the pressed area has kinks, other numbers are differenced less well."""
-    moves = differences.moves(scene, q, v)
-    for letter, by in zip("qv", scene.contact_derivatives(q, v), strict=True):
-        for k, column in enumerate(by.T):
-            moved, scale, _ = moves[f"{letter}.{k}"]
-            f = lambda x, moved=moved: torques(*moved(x))  # noqa: E731
-            assert differences.off(column, f, scale, floor=1e-2 * np.abs(by).max()) <= 1e-6
-
-
-PLACES = {
-    "dome": lambda: (shell_of("dome", 0.6), [1.0, 2.0, 4.3]),
-    "cube": lambda: (edged("cube"), [2.3, 2.2, 2.6]),
-    "border": lambda: (edged("cap"), [1.9, 0.3, 0.5]),
-}
-
-
-@pytest.mark.parametrize("friction", [None, COULOMB, BRISTLE], ids=["free", "coulomb", "bristle"])
-@pytest.mark.parametrize("law", [LAW, DAMPED], ids=["elastic", "damped"])
-@pytest.mark.parametrize("place", list(PLACES))
-def test_derivatives(place: str, law: sp.FoundationLaw, friction) -> None:
-    shell, center = PLACES[place]()
-    scene = free_ball(shell, law, friction, gravity=9.81)
-    rng = np.random.default_rng(2)
-    q = pin.integrate(scene.model, free_q(center), np.r_[np.zeros(3), rng.normal(size=3)])
-    assert_derivatives(scene, q, 0.3 * rng.normal(size=6))
 
 
 def test_bristle_holds_at_the_center_of_pressure() -> None:
@@ -170,24 +124,13 @@ def test_energy_with_friction() -> None:
     assert np.abs(energy.residual).max() <= 1e-6 * np.ptp(energy.kinetic)
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [
-        sp.Implicit(rtol=1e-6, atol=1e-8),
-        sp.LinearlyImplicitEuler(1e-4),
-        sp.SemiImplicitEuler(1e-4),
-        sp.RungeKutta4(1e-3),
-    ],
-    ids=lambda one: type(one).__name__,
-)
+@models.every_integrator(1e-4, 1e-6, 1e-6)
 @pytest.mark.parametrize("friction", [COULOMB, BRISTLE], ids=["coulomb", "bristle"])
 def test_every_integrator_comes_to_rest(integrator, friction) -> None:
     """At the depth where the foundation carries the weight."""
     law = sp.FoundationLaw(1e4, 0.5, dissipation=3.0)
     scene = free_ball(sp.Shell(*meshes.grid_plate(3, 3, size=4.0)), law, friction, gravity=9.81)
-    result = sp.Simulation(scene, integrator).run(
-        free_q([0.1, 0.2, 0.97]), np.zeros(6), 0.7, record_dt=0.01
-    )
+    result = models.run(scene, integrator, free_q([0.1, 0.2, 0.97]), None, 0.7, record_dt=0.01)
     depth = law.on_plane(1.0).depth_at(98.1)
     assert 1 - result.q[-1, 2] == pytest.approx(depth, rel=2e-2)
     assert np.abs(result.energy.residual).max() <= 1e-2 * np.ptp(result.energy.kinetic) + 1e-4
@@ -197,28 +140,15 @@ def test_every_integrator_comes_to_rest(integrator, friction) -> None:
 @pytest.mark.parametrize(("speed", "depth", "duration"), [(2.0, 0.1, 1.0), (60.0, 1.0, 0.1)])
 def test_two_spheres(speed: float, depth: float, duration: float) -> None:
     """The faster one goes in by more than its radius: its center is within the other, too."""
-    model = ball(0.0, 10.0, 1.0)
-    scene = sp.Scene(model)
-    scene.add_contact(
-        sphere=sp.Sphere(1.0, frame="ball"),
-        shell=sp.Sphere(2.0, frame="universe"),
-        law=LAW,
-        friction=COULOMB,
-        name="ball",
-    )
+    scene = sp.Scene(ball(0.0, 10.0, 1.0))
+    other = sp.Sphere(2.0, "universe")
+    scene.add_contact(sp.Sphere(1.0, "ball"), other, law=LAW, name="ball")
     q, v = free_q([0.0, 1.7, 2.35]), np.array([0.3, 0.1, -0.2, 0.4, 0.3, 2.0])
-    scene.replace_pair("ball", friction=None)
     assert_derivatives(scene, q, v)
     start = np.array([0, 0, -speed, 0, 0, 0])
     result = drop(scene, free_q([0.2, 0.1, 3.2]), start, duration)
     assert result.stats.pairs["ball"].max_depth > depth
     assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
-
-
-def test_contact_sources_are_refused() -> None:
-    scene = sp.Scene(ball())
-    with pytest.raises(InvalidParameter, match="contact source"):
-        scene.add_contact_source(lambda i, j: None, "ball", "universe", LAW)  # type: ignore
 
 
 def test_a_foundation_that_cannot_carry_its_load_says_so() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import sphshell_pin as sp
 from tests import meshes, models
+from tests.models import run
 
 R = 0.01
 every = models.every_integrator(1e-2, 1e-5, 1e-4)
@@ -17,10 +18,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::sphshell_pin.errors.WeakLawWarn
 def scene_of(model: pin.Model, size: float, law: sp.ImpactLaw, **more) -> sp.Scene:
     """A sphere at the frame "ball" and a sheet of this size."""
     return models.on_shell(model, models.square(size), law, radius=R, **more)
-
-
-def run(scene: sp.Scene, integrator, q, v, duration: float, **more) -> sp.Result:
-    return sp.Simulation(scene, integrator).run(np.asarray(q), np.asarray(v), duration, **more)
 
 
 def stopping(speed: float, mass: float = 1.0, share: float = 0.3) -> sp.ImpactLaw:
@@ -45,8 +42,8 @@ def test_a_sweeping_arm_meets_a_thin_plate(integrator, rate: float) -> None:
     scene = scene_of(fingertip(), 0.2, law, placement=at(0.5))
     start = -0.8  # the tip is above the plate, and the angle grows downward
     rows = run(scene, integrator, [start], [rate], 1.6 / rate)
-    assert "touch" in [e.kind for e in rows.events]
-    assert "through" not in [e.kind for e in rows.events]
+    assert "touch" in kinds(rows)
+    assert "through" not in kinds(rows)
     assert rows.q[-1, 0] < 0.0
     assert rows.v[-1, 0] < -0.5 * rate
 
@@ -68,8 +65,8 @@ def test_a_sheet_that_turns_hits_a_resting_sphere(integrator) -> None:
     """The ball leaves with twice the sheet's speed there (a heavy wall)."""
     scene = paddle(pin.JointModelRY(), at(0.3))
     rows = run(scene, integrator, [0.3, 0.0, -0.2, -1.0], [0.0, 0.0, 0.0, 100.0], 0.02)
-    assert "touch" in [e.kind for e in rows.events]
-    assert "through" not in [e.kind for e in rows.events]
+    assert "touch" in kinds(rows)
+    assert "through" not in kinds(rows)
     speed = np.linalg.norm(rows.v[-1, :3])
     lever = np.hypot(0.3, 0.2)
     assert 0.8 < speed / (2 * 100.0 * lever) < 1.1
@@ -89,7 +86,7 @@ def test_whole_turns_within_a_step_are_seen(times: int) -> None:
     rate, dt = times * 2 * np.pi / 1e-2, 1e-2
     scene = scene_of(fingertip(), 0.2, stopping(0.5 * rate, 1.0004), placement=at(0.5))
     rows = run(scene, sp.SemiImplicitEuler(dt), [-0.8], [rate], 3 * dt)
-    assert "touch" in [e.kind for e in rows.events]
+    assert "touch" in kinds(rows)
 
 
 @every
@@ -99,7 +96,7 @@ def test_a_graze_of_an_edge_within_a_step(integrator) -> None:
     speed = 40.0
     start, v = [0.5 + 0.9 * R, 0.0, 0.3], [0.0, 0.0, -speed]
     rows = run(scene, integrator, start, v, 0.6 / speed)
-    assert [e.kind for e in rows.events] == ["touch", "lift_off"]
+    assert kinds(rows) == ["touch", "lift_off"]
     # Against an impulse at right angles to the way: pushed outward.
     fine = run(scene, sp.Adaptive(1e-9), start, v, 0.6 / speed)
     assert rows.v[-1, 0] == pytest.approx(fine.v[-1, 0], rel=0.35)
@@ -118,7 +115,7 @@ def test_what_turns_a_sphere_round_within_a_step_is_a_touch(share: float) -> Non
     scene = scene_of(models.block(0.0), 1.0, law)
     rows = run(scene, sp.RungeKutta4(dt), [0.01, 0.02, (1 + 0.5 * share) * R], [0, 0, -speed], dt)
     figures = rows.stats.pairs[rows.pairs[0]]
-    assert [event.kind for event in rows.events][:1] == ["touch"]
+    assert kinds(rows)[:1] == ["touch"]
     assert figures.impulse == pytest.approx(rows.v[-1, 2] + speed, rel=1e-2)
 
 
@@ -132,14 +129,15 @@ def led(path, shell=None) -> sp.Result:
         goal = path[i] + (t * pieces - i) * (path[i + 1] - path[i])
         return 1e4 * (1e5 * (goal - q) + 600.0 * (pieces * (path[i + 1] - path[i]) - v))
 
-    law = models.linear_law(100.0)
-    if shell is None:
-        scene = scene_of(models.block(0.0, 1e4), 1.0, law)
-    else:
-        scene = models.on_shell(models.block(0.0, 1e4), shell, law, radius=R)
+    model, law = models.block(0.0, 1e4), models.linear_law(100.0)
+    scene = models.on_shell(model, shell or models.square(1.0), law, radius=R)
     more = {"controller": controller, "control_dt": 2e-4}
     speed = pieces * (path[1] - path[0])
     return run(scene, sp.SemiImplicitEuler(2e-4), path[0], speed, 1.0, **more)
+
+
+def kinds(rows: sp.Result) -> list[str]:
+    return [event.kind for event in rows.events]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -147,8 +145,7 @@ def test_pushed_past_and_back(side: float) -> None:
     """k depth all the way, depth measured from the side it came from; ends where it began."""
     up = side * np.array([0, 0, R])
     rows = led([1.2 * up, -0.4 * up, 1.2 * up])
-    kinds = [e.kind for e in rows.events]
-    assert kinds == ["touch", "deep", "through", "lift_off"]
+    assert kinds(rows) == ["touch", "deep", "through", "lift_off"]
     log = rows.contacts
     depth = R - side * rows.q[log.row, 2]
     assert log.depth == pytest.approx(depth, abs=1e-12)
@@ -199,7 +196,7 @@ def test_round_the_rim_without_being_turned(integrator, beside: float) -> None:
     scene = scene_of(models.block(0.0, 1e3), 1.0, models.linear_law(100.0))
     start = [0.5 + beside * R, 0.03, 1.26 * R]
     rows = run(scene, integrator, start, [0.0, 0.0, -0.2], 2.6 * R / 0.2)
-    assert [e.kind for e in rows.events] == ["touch", "deep", "lift_off"]
+    assert kinds(rows) == ["touch", "deep", "lift_off"]
     depth = rows.stats.pairs[rows.pairs[0]].max_depth
     assert depth <= (1 - beside) * R * (1 + 1e-9)
     # k r^2 / 2 is what the contact holds at most; pushed the wrong way it would hold four times it.

@@ -49,22 +49,3 @@ def test_rings_against_the_theory(rings: int) -> None:
         energy = one.result.energy
         assert np.abs(energy.residual).max() < 1e-8 * energy.exchanged
         assert np.diff(energy.friction_loss).min() > -1e-8 * energy.exchanged
-
-
-@pytest.mark.parametrize("restitution", [1.0, 0.98])
-@pytest.mark.parametrize("degrees", [35, 50, 70, 85])
-def test_gross_sliding(degrees: float, restitution: float) -> None:
-    """v_t' = v_t - mu (1 + e) v_n; the spin has the arm r - depth of the contact point."""
-    law = sp.HertzLaw(*ALUMINA_GLASS, restitution=restitution, speed=SPEED)
-    out = thrown(degrees, law=law)
-    down = SPEED * math.cos(math.radians(degrees))
-    along = SPEED * math.sin(math.radians(degrees))
-    lost = MU * (1 + out.normal) * down
-    assert out.tangential == pytest.approx(1 - lost / along, abs=1e-6)
-    assert out.spin == pytest.approx(2.5 * lost / BALL, rel=6e-3)
-    if restitution == 1.0:
-        # The impulse-weighted depth of an elastic impact: B(2/5, 3/2) / (5/2) of the largest.
-        beta = math.gamma(0.4) * math.gamma(1.5) / math.gamma(1.9)
-        mass = DENSITY * 4 / 3 * math.pi * BALL**3
-        mean = beta / 2.5 * ELASTIC.on_plane(BALL).depth_of(0.5 * mass * down**2)
-        assert out.spin == pytest.approx(2.5 * lost * (BALL - mean) / BALL**2, rel=1e-6)

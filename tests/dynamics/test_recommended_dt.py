@@ -2,7 +2,6 @@
 
 import math
 import warnings
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -118,9 +117,8 @@ def test_steps_that_are_short_enough_earn_no_warning() -> None:
     scene = falling(ELASTIC["linear"])
     q, v = [RADIUS], [-SPEED]
     dt = scene.explain(q, v).recommended_dt
-    for share, count in ((1.0001, 0), (1.0002, 1)):
-        said = scene.explain(q, v, dt=share * dt).warnings
-        assert sum("recommended" in one for one in said) == count
+    told = [scene.explain(q, v, dt=share * dt).warnings for share in (1.0001, 1.0002)]
+    assert ["recommended" in str(warnings) for warnings in told] == [False, True]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(q, v, 10 * dt)
@@ -136,41 +134,23 @@ def spring(time: float) -> sp.ImpactLaw:
     return sp.ImpactLaw(MASS * (math.pi / time) ** 2, 1.0)
 
 
-@pytest.mark.parametrize(("dt", "below"), [(1e-4, 5e-5), (2e-4, 1e-4), (5e-4, 2e-4)])
-def test_a_thirtieth_is_rounded_down(dt: float, below: float) -> None:
-    for share, expected in ((1 + 1e-7, dt), (1 - 1e-7, below)):
-        scene = falling(spring(30 * dt * share))
-        assert scene.explain([RADIUS], [-SPEED]).recommended_dt == pytest.approx(expected)
-    assert any("recommended" in one for one in scene.explain([RADIUS], dt=1.01 * below).warnings)
-
-
-def test_the_shortest_of_pairs_and_joints_counts() -> None:
-    stop = sp.JointLimits(-1.0, 1.0, spring(0.03))
+def test_the_shortest_of_pairs_and_joints_counts_and_a_thirtieth_is_rounded_down() -> None:
     model = models.slider(0.0, MASS)
-    joints = sp.JointComponents(limits={str(model.names[1]): stop})
-    scene = sp.Scene(model, joints=joints)
+    stop = sp.JointLimits(-1.0, 1.0, spring(0.03))
+    scene = sp.Scene(model, joints=sp.JointComponents(limits={model.names[1]: stop}))
     assert sp.Scene(models.slider()).explain().recommended_dt == 1e-3
-    for time, dt in ((0.3, 1e-3), (0.0151, 5e-4), (0.00301, 1e-4), (0.0061, 1e-4)):
+    for time, dt in ((0.3, 1e-3), (0.015001, 5e-4), (0.014999, 2e-4), (0.003001, 1e-4)):
         scene.add_contact(sp.Sphere(RADIUS, "ball"), models.plate(), law=spring(time))
         assert scene.explain([RADIUS], [-SPEED]).recommended_dt == pytest.approx(dt)
+    assert any("recommended" in one for one in scene.explain([RADIUS], dt=1.01e-4).warnings)
 
 
 def test_figures_of_a_spring() -> None:
     rate = math.sqrt(1e5 / MASS)
-    one = falling(sp.ImpactLaw(1e5, 1.0), gravity=9.81).explain([RADIUS], [-SPEED]).pairs[0]
-    found = (one.effective_mass, one.contact_time, one.impact_depth, one.resting_depth)
+    one = falling(ELASTIC["linear"], gravity=9.81).explain([RADIUS], [-SPEED]).pairs[0]
+    found = one.effective_mass, one.contact_time, one.impact_depth, one.resting_depth
     assert found == pytest.approx((MASS, math.pi / rate, SPEED / rate, 9.81 / rate**2), rel=1e-9)
     assert one.depth_limit_speed == pytest.approx(RADIUS * rate)
-
-
-@pytest.mark.parametrize(
-    ("side", "gaps"),
-    [("both", (0.01, 0.01)), ("outside", (0.01, -0.11)), ("inside", (-0.11, 0.01))],
-)
-def test_the_gap_is_on_the_side_of_the_shell(side: str, gaps: tuple[float, float]) -> None:
-    scene = models.on_plate(models.slider(), ELASTIC["linear"], shell=models.plate(side=side))
-    found = [scene.explain([z]).pairs[0].gap for z in (0.06, -0.06)]
-    assert found == pytest.approx(gaps)
 
 
 def two_bodies(joint: type) -> sp.Scene:
@@ -205,19 +185,15 @@ def on_a_slide(side: str) -> sp.Scene:
     return pair_of(model, sphere, models.plate(side=side), "table", turn)
 
 
-def lever() -> sp.Scene:
-    """A link of inertia I on a hinge, its tip L away: I / L^2, at L w."""
-    model = models.empty(0.0)
-    inertia = models.pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.2, 0.3]))
-    tip = models.pin.SE3(np.eye(3), np.array([0.4, 0.0, 0.06]))
-    models.add_body(model, "ball", models.pin.JointModelRY(), inertia=inertia, frame=tip)
-    return models.on_plate(model, ELASTIC["linear"])
-
-
 def beside_a_border() -> sp.Scene:
     """The normal leads to the center."""
     sphere = sp.Sphere(RADIUS, "ball", (0.53, 0.0, 0.04))
     return pair_of(models.slider(0.0, MASS), sphere, models.plate())
+
+
+def sided(side: str, height: float) -> float:
+    """The height over a shell on the side that counts."""
+    return {"both": abs(height), "outside": height, "inside": -height}[side]
 
 
 PZ, FREE = models.pin.JointModelPZ, models.pin.JointModelTranslation
@@ -243,11 +219,10 @@ FIGURES = [
     # Where the center lies on the surface the normal is the surface's.
     *(
         (lambda side=side: on_a_slide(side), [x, 0.0], [-0.3, 0.2])
-        + ((-1 if side == "inside" else 1) * (x + 0.02) - RADIUS, 0.75, 0.5)
+        + (sided(side, x + 0.02) - RADIUS, 0.75, 0.5)
         for side in ("both", "outside", "inside")
-        for x in (0.03, -0.02)
+        for x in (0.03, -0.02, -0.08)
     ),
-    (lever, [0.0], [0.5], 0.01, 0.2 / 0.4**2, 0.4 * 0.5),
     (beside_a_border, [0.0], [-0.5], 0.0, MASS / 0.64, 0.4),
 ]
 
@@ -270,7 +245,7 @@ def test_bodies_that_turn_and_are_met_off_their_centers(seed: int) -> None:
     scene, (q, v) = two_spheres(ELASTIC["linear"], friction), in_touch(seed)
     pair = scene.explain(q, v).pairs[0]
     places = [models.pin.XYZQUATToSE3(q[k : k + 7]) for k in (0, 7)]
-    spheres = (scene.pairs[0].side_i.sphere, scene.pairs[0].side_j.sphere)
+    spheres = [side.sphere for side in scene.pairs[0].spheres]
     one, two = (at * np.array(sphere.offset) for at, sphere in zip(places, spheres, strict=True))
     normal = (one - two) / np.linalg.norm(one - two)
     point = two + spheres[1].radius * normal
@@ -282,8 +257,8 @@ def test_bodies_that_turn_and_are_met_off_their_centers(seed: int) -> None:
         mobility += np.eye(3) / inertia.mass - arm @ np.linalg.solve(about, arm)
         linear, spin = (at.rotation @ part for part in np.split(v[6 * k : 6 * k + 6], 2))
         closing += (1 - 2 * k) * normal @ (linear + np.cross(spin, point - at.translation))
-    found = (pair.gap, pair.effective_mass, pair.approach_speed)
-    expected = (-0.004, 1 / (normal @ mobility @ normal), abs(closing))
+    found = pair.gap, pair.effective_mass, pair.approach_speed
+    expected = -0.004, 1 / (normal @ mobility @ normal), abs(closing)
     assert found == pytest.approx(expected, rel=1e-9)
     across = np.eye(3) - np.outer(normal, normal)
     slip_mass = 1 / np.linalg.eigvalsh(across @ mobility @ across).max()
@@ -291,45 +266,37 @@ def test_bodies_that_turn_and_are_met_off_their_centers(seed: int) -> None:
 
 
 def test_what_does_not_move_at_all_has_no_mass() -> None:
-    scene = sp.Scene(models.empty())
-    sphere = sp.Sphere(RADIUS, "universe", (0.0, 0.0, 0.04))
-    friction = sp.BristleFriction(0.5, 0.5, 1e6)
-    scene.add_contact(sphere, models.plate(), law=ELASTIC["linear"], friction=friction)
-    explained = scene.explain()
+    """Nor has what is heavier than a mountain."""
+    sphere, friction = sp.Sphere(RADIUS, "universe", (0.0, 0.0, 0.04)), FRICTIONS["bristle"]
+    explained = pair_of(models.empty(), sphere, models.plate(), friction=friction).explain()
     assert math.isnan(explained.pairs[0].effective_mass)
     assert (explained.pairs[0].shortest_time, explained.recommended_dt) == (math.inf, 1e-3)
-
-
-@pytest.mark.parametrize(("mass", "moves"), [(0.75e12, True), (1e12, False), (1.5e12, False)])
-def test_what_is_heavier_than_a_mountain_does_not_move(mass: float, moves: bool) -> None:
-    pair = models.on_plate(models.slider(0.0, mass), ELASTIC["linear"]).explain([RADIUS]).pairs[0]
-    assert math.isfinite(pair.effective_mass) == moves
+    for mass, moves in ((0.75e12, True), (1e12, False), (1.5e12, False)):
+        heavy = models.on_plate(models.slider(0.0, mass), ELASTIC["linear"])
+        assert math.isfinite(heavy.explain([RADIUS]).pairs[0].effective_mass) == moves
 
 
 def source(points: list, depths: list, friction: sp.BristleFriction | None = None) -> sp.Scene:
     scene = sp.Scene(models.slider(0.0, MASS))
-    normals = np.tile([0.0, 0.6, 0.8], (len(depths), 1))
-    find = lambda i, j: (np.array(points), normals, depths)  # noqa: E731
-    law = sp.ImpactLaw(1e5, 1.0)
-    scene.add_contact_source(find, "ball", "universe", law, friction, name="own")
+    find = lambda i, j: (points, [[0.0, 0.6, 0.8]] * len(depths), depths)  # noqa: E731
+    scene.add_contact_source(find, "ball", "universe", ELASTIC["linear"], friction, name="own")
     return scene
 
 
 def test_a_source_counts_where_it_is_deepest() -> None:
-    scene = source([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]], [1e-3, 4e-3])
-    pair = scene.explain([0.0], [-SPEED]).pairs[0]
+    pair = source([[0, 0, 0], [0.1, 0, 0]], [1e-3, 4e-3]).explain([0.0], [-SPEED]).pairs[0]
     # The slide holds the ball across: along the normal it weighs 1 / 0.8^2 of its mass.
-    found = (pair.gap, pair.effective_mass, pair.approach_speed)
+    found = pair.gap, pair.effective_mass, pair.approach_speed
     assert found == pytest.approx((-4e-3, MASS / 0.64, 0.8 * SPEED), rel=1e-12)
     assert math.isnan(pair.depth_limit_speed)
     bristles = sp.BristleFriction(0.5, 0.5, 1e9)
-    pair = source([[0.0, 0.0, 0.0]], [1e-3], bristles).explain([0.0]).pairs[0]
+    pair = source([[0, 0, 0]], [1e-3], bristles).explain([0.0]).pairs[0]
     # Across the normal it weighs 1 / 0.6^2 of its mass.
     ring = math.pi * math.sqrt(MASS / 0.36 / 1e9)
     assert pair.shortest_time == pytest.approx(ring, rel=1e-9)
     nothing = source([], []).explain([0.0])
     pair = nothing.pairs[0]
-    assert all(map(math.isnan, (pair.gap, pair.effective_mass, pair.contact_time)))
+    assert np.isnan([pair.gap, pair.effective_mass, pair.contact_time]).all()
     assert (pair.shortest_time, nothing.recommended_dt) == (math.inf, 1e-3)
 
 
@@ -382,38 +349,29 @@ def test_joints_have_scales_of_their_own() -> None:
 
     assert scale(damping=3.0) == math.inf
     assert scale(friction=dry) == pytest.approx(ring, rel=1e-12)
-    assert scale(limits=stop, speed=2.0) == pytest.approx(impact(2.0), rel=1e-12)
-    assert scale(limits=stop, speed=0.01) == pytest.approx(impact(0.01), rel=1e-12)
-    assert scale(limits=stop, speed=0.01, friction=dry) == pytest.approx(ring, rel=1e-12)
-    assert scale(limits=stop, speed=50.0, friction=dry) == pytest.approx(impact(50.0), rel=1e-12)
+    for speed in (0.01, 2.0, 50.0):
+        assert scale(limits=stop, speed=speed) == pytest.approx(impact(speed), rel=1e-12)
+        shortest = min(ring, impact(speed))
+        both = scale(limits=stop, speed=speed, friction=dry)
+        assert both == pytest.approx(shortest, rel=1e-12)
 
 
 def test_relaxation_and_weakness_follow_the_speed_that_the_law_can_stop() -> None:
     for stiffness in (1e4, 1e12):
         pair = (scene := falling(sp.ImpactLaw(stiffness, 1.0))).pairs[0]
         limit = RADIUS * math.sqrt(stiffness / MASS)
-        figures = scene.explain([RADIUS], [-(1 - 1e-9) * limit]).pairs[0]
-        assert weakness(pair, figures) is None
+        below, above = (
+            scene.explain([RADIUS], [-share * limit]).pairs[0] for share in (1 - 1e-9, 1 + 1e-9)
+        )
+        assert weakness(pair, below) is None
+        assert "the law cannot stop the sphere" in str(weakness(pair, above))
         expected = min(0.02 * math.pi * math.sqrt(MASS / stiffness), 2e-5)
-        assert relaxation_time(pair, figures) == pytest.approx(expected, rel=1e-9)
-        figures = scene.explain([RADIUS], [-(1 + 1e-9) * limit]).pairs[0]
-        assert "the law cannot stop the sphere" in str(weakness(pair, figures))
-        assert weakness(pair, replace(figures, impact_depth=RADIUS)) is not None
-        assert relaxation_time(pair, replace(figures, depth_limit_speed=math.nan)) == 2e-5
-    pair = (scene := falling(TABLE)).pairs[0]
-    unknown = replace(scene.explain([RADIUS]).pairs[0], depth_limit_speed=math.nan)
-    assert relaxation_time(pair, unknown) == 2e-5
-    own = source([[0.0, 0.0, 0.0]], [1e-3])
-    assert relaxation_time(own.pairs[0], own.explain([0.0]).pairs[0]) == 2e-5
+        assert relaxation_time(pair, below) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize(("share", "soft"), [(0.08, False), (0.15, True), (0.3, True)])
 def test_a_law_in_which_a_body_sinks_by_a_tenth_of_its_radius_is_soft(share, soft) -> None:
-    radius, mass = 0.05, 2.0
-    law = models.linear_law(mass * 9.81 / (share * radius), 10.0)
-    scene = models.on_plate(models.ball(mass=mass), law, radius=radius)
-    report = scene.explain(models.free_q([0, 0, radius]))
-    told = [one for one in report.warnings if "the law is soft for this mass" in one]
+    scene = falling(models.linear_law(MASS * 9.81 / (share * RADIUS), 10.0), gravity=9.81)
+    told = [one for one in scene.explain([RADIUS]).warnings if "soft for this mass" in one]
     assert len(told) == soft
-    if soft:
-        assert f"at rest the depth is {share:.0%} of the radius" in told[0]
+    assert all(f"at rest the depth is {share:.0%} of the radius" in one for one in told)

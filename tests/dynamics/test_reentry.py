@@ -111,15 +111,15 @@ def scene_of(holder: Holder) -> sp.Scene:
     return holder.scene
 
 
-def pair_of(holder: Holder) -> object:
-    return holder.pair._bind()
+MAKERS = {
+    "run": run_of,
+    "scene": scene_of,
+    "pair": lambda holder: holder.pair._bind(),
+    "controller": lambda holder: _core.PythonController(holder.torque),
+}
 
 
-def controller_of(holder: Holder) -> object:
-    return _core.PythonController(holder.torque)
-
-
-@pytest.mark.parametrize("make", [run_of, scene_of, pair_of, controller_of])
+@pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)
 def test_cycles_through_a_routine_are_collected(make) -> None:
     watched = [weakref.ref(Holder(make)) for _ in range(5)]
     kept = Holder(make)

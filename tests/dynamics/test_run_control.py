@@ -1,10 +1,14 @@
 """How runs start, stop, repeat and are kept: controllers, faults, files, locked joints."""
 
 import os
+import re
 import signal
 import sys
 import threading
-from dataclasses import replace
+import warnings
+from contextlib import suppress
+from dataclasses import astuple, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +16,13 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import errors
+from sphshell_pin import errors, robots
 from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
+from sphshell_pin.dynamics.run import advance
+from sphshell_pin.dynamics.scene.explain import explain_pairs
 from tests import models
 from tests.results import assert_same_bits
+from tests.texts import DATA
 
 RADIUS = 0.05
 START = models.free_q([0.1, -0.05, RADIUS + 0.01]), np.array([1.0, 0.3, -0.2, 10.0, -20.0, 5.0])
@@ -29,16 +36,14 @@ def bouncing(integrator=None) -> sp.Simulation:
 def test_a_diverging_run_keeps_what_it_computed() -> None:
     """Explicit damping with dt kd / m = 1e4 multiplies the speed at every step."""
     sim = sp.Simulation(sp.Scene(models.slider()), sp.SemiImplicitEuler(dt=1e-2))
-    controller = sp.JointPD(kp=np.zeros(1), kd=np.full(1, 1e6), q_ref=np.array([0.5]))
-    with pytest.raises(errors.SimulationDiverged) as caught:
-        sim.run(np.array([0.5]), np.array([0.1]), 100.0, controller)
+    with pytest.raises(errors.SimulationDiverged, match="dt") as caught:
+        sim.run([0.5], [0.1], 100.0, sp.JointPD(kp=0.0, kd=1e6, q_ref=[0.5]))
     result = caught.value.result
     assert 0.0 < caught.value.t < 100.0
     assert len(result.t) == len(result.q) == len(result.v) >= 1
     assert result.t[-1] <= caught.value.t
     for rows in (result.t, result.q, result.v):
         assert np.isfinite(rows).all()
-    assert "dt" in str(caught.value)
 
 
 @pytest.mark.usefixtures("keyboard")
@@ -61,31 +66,26 @@ def test_ctrl_c(options) -> None:
 
 
 def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
-    model = models.empty()
     mixed = pin.JointModelComposite(pin.JointModelPX())
     mixed.addJoint(pin.JointModelRUBZ(), pin.SE3.Identity())
     parts = {
         "flyer": (pin.JointModelFreeFlyer(), slice(3, 7)),
-        "hinge": (pin.JointModelRX(), None),
+        "hinge": (pin.JointModelRX(), slice(0, 0)),
         "sled": (pin.JointModelPlanar(), slice(2, 4)),
         "mixed": (mixed, slice(1, 3)),
         "wheel": (pin.JointModelRUBX(), slice(0, 2)),
         "socket": (pin.JointModelSpherical(), slice(0, 4)),
     }
-    parent = 0
+    model, parent = models.empty(), 0
     for name, (joint, _) in parts.items():
         parent = models.add_body(model, name, joint, parent)
     scene = sp.Scene(model)
-    for name, (_, part) in parts.items():
-        if part is None:
-            continue
-        joint = model.joints[model.getJointId(f"{name}_joint")]
-        for scale in (0.0, 0.9, 2.0):
-            q = pin.neutral(model)
-            q[joint.idx_q : joint.idx_q + joint.nq][part] *= scale
-            with pytest.raises(
-                errors.InvalidParameter, match=f"'{name}_joint'.*unit length"
-            ) as caught:
+    for (name, (_, part)), scale in product(parts.items(), (0.0, 0.9, 2.0)):
+        first = model.joints[model.getJointId(f"{name}_joint")].idx_q
+        q = pin.neutral(model)
+        q[first + part.start : first + part.stop] *= scale
+        if part.stop:
+            with pytest.raises(errors.InvalidParameter, match=f"'{name}_joint'.*unit") as caught:
                 scene.check_state(q)
             assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
             assert len(caught.value.value) == part.stop - part.start
@@ -123,20 +123,6 @@ def test_a_python_controller_sees_contacts() -> None:
     assert seen == pytest.approx([9.81] * 5, rel=1e-9)
 
 
-def test_a_python_controller_equals_the_built_in_one() -> None:
-    """Joint PD without gravity compensation, evaluated at every step."""
-    kp, kd = np.array([40.0, 40.0, 20.0]), np.array([2.0, 2.0, 1.0])
-    scene = models.on_plate(models.arm(), models.LAW, models.FRICTION)
-    sim = sp.Simulation(scene, sp.SemiImplicitEuler(dt=1e-3))
-    goal = models.ARM_Q + np.array([0.1, 0.2, -0.1])
-    built_in = sp.JointPD(kp, kd, goal, gravity_compensation=False)
-    a = sim.run(models.ARM_Q, np.zeros(3), 0.3, built_in)
-    b = sim.run(
-        models.ARM_Q, np.zeros(3), 0.3, lambda t, q, v, c: kp * (goal - q) - kd * v, control_dt=1e-3
-    )
-    assert b.q == pytest.approx(a.q, abs=1e-9)
-
-
 def test_an_error_in_a_controller_comes_through() -> None:
     def controller(t, q, v, contacts):
         raise LookupError("no torque today")
@@ -147,33 +133,17 @@ def test_an_error_in_a_controller_comes_through() -> None:
     assert "raised by the controller at t = 0 s (test_run_control.py:controller, line " in note
 
 
-def test_a_controller_of_the_wrong_size_is_named() -> None:
-    with pytest.raises(errors.InvalidParameter):
-        bouncing().run(*START, 0.1, lambda t, q, v, c: np.zeros(5), control_dt=1e-2)
-
-
-@pytest.mark.parametrize("stepper", [sp.SemiImplicitEuler, sp.RungeKutta4])
-def test_repeated_runs_are_bit_identical(stepper) -> None:
-    sim = bouncing(stepper(dt=1e-4))
-    first, again = sim.run(*START, 0.3), sim.run(*START, 0.3)
-    assert_same_bits(first, again)
-    assert_same_bits(first, bouncing(stepper(dt=1e-4)).run(*START, 0.3))
-    assert len(first.contacts.depth) > 10
-
-
 def test_rows_of_a_result() -> None:
     result = bouncing().run(*START, 0.3, record_dt=1e-3)
-    assert result.t[0] == 0.0
-    assert result.t[-1] == pytest.approx(0.3, abs=1e-12)
+    assert (result.t[0], result.t[-1]) == pytest.approx((0.0, 0.3), abs=1e-12)
     assert np.array_equal(result.q[0], START[0])
     assert np.array_equal(result.v[0], START[1])
-    log = result.contacts
+    log, stats = result.contacts, result.stats.pairs["ball-plate"]
     assert np.array_equal(log.t, result.t[log.row])
-    kinds = [e.kind for e in result.events if e.pair == "ball-plate"]
+    kinds = [e.kind for e in result.events]
     assert kinds[:2] == ["touch", "lift_off"]
     drop = ((0.2**2 + 2 * 9.81 * 0.01) ** 0.5 - 0.2) / 9.81
     assert result.events[0].t == pytest.approx(drop, abs=2e-4)
-    stats = result.stats.pairs["ball-plate"]
     assert stats.touches == kinds.count("touch")
     assert stats.max_depth >= log.depth.max() - 1e-12
     assert stats.peak_force >= log.normal_force.max() - 1e-9
@@ -239,29 +209,116 @@ def test_what_load_would_refuse_is_not_written(tmp_path: Path, change, said: str
 
 def test_a_file_of_version_0_1_is_read() -> None:
     """It calls the ids of contacts numbers."""
-    result = sp.Result.load(Path(__file__).parents[1] / "data" / "run_of_version_0_1.npz")
-    assert (len(result.t), result.stats.steps, result.stats.integrator) == (
-        11,
-        200,
-        "SemiImplicitEuler",
-    )
-    figures = result.stats.pairs["ball-plate"]
-    assert figures.peak_force >= result.contacts.normal_force.max() > 0
-    assert set(result.contacts.contact_id) == {0}
+    result = sp.Result.load(DATA / "run_of_version_0_1.npz")
+    stats, log = result.stats, result.contacts
+    assert (len(result.t), stats.steps, stats.integrator) == (11, 200, "SemiImplicitEuler")
+    assert stats.pairs["ball-plate"].peak_force >= log.normal_force.max() > 0
+    assert set(log.contact_id) == {0}
 
 
 def test_lock_equals_the_model_reduced_by_hand() -> None:
-    model = models.arm()
-    locked = model.getJointId("two_joint")
-    q_lock = np.array([0.0, 1.9, 0.0])
-    by_hand = models.on_plate(
-        pin.buildReducedModel(model, [locked], q_lock), models.LAW, models.FRICTION
-    )
+    model, q_lock = models.arm(), np.array([0.0, 1.9, 0.0])
+    reduced = pin.buildReducedModel(model, [model.getJointId("two_joint")], q_lock)
+    by_hand = models.on_plate(reduced, models.LAW, models.FRICTION)
     scene = sp.Scene(model, lock=["two_joint"], q_lock=q_lock)
     more = {"friction": models.FRICTION, "method": "facets", "name": "ball-plate"}
     scene.add_contact(sp.Sphere(RADIUS, "ball"), models.plate(), law=models.LAW, **more)
-    assert scene.model.nq == 2
-    q0, v0 = np.array([0.3, 0.5]), np.array([1.0, 0.0])
-    a, b = (sp.Simulation(s, sp.RungeKutta4(dt=1e-3)).run(q0, v0, 0.4) for s in (by_hand, scene))
+    start = [0.3, 0.5], [1.0, 0.0]
+    a, b = (models.run(one, sp.RungeKutta4(1e-3), *start, 0.4) for one in (by_hand, scene))
     assert len(a.contacts.depth) > 0
     assert_same_bits(a, b)
+
+
+LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
+
+
+def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
+    """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
+    arm, plate = robots.load("panda"), models.plate()
+    scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
+    frames = ("panda_link3", "panda_link5", "panda_link7", "panda_hand")
+    for (k, frame), method in product(enumerate(frames), ("smooth", "facets")):
+        ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
+        friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
+        more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
+        scene.add_contact(ball, plate, placement=where, **more)
+    scene.add_contact(sp.Sphere(0.02, frames[0]), plate, frame=frames[2], law=LAW, name="moving")
+    scene.add_contact(sp.Sphere(0.02, frames[3]), sp.Sphere(0.03, frames[1]), law=LAW, name="two")
+    scene.add_contact(sp.Plane("universe"), plate, frame=frames[3], law=LAW, name="plane")
+    scene.add_contact_source(nowhere, frames[0], frames[1], law=LAW, name="own")
+    return scene, np.asarray(arm.q0)
+
+
+def nowhere(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+
+
+def test_the_figures_of_pairs_do_not_depend_on_the_other_pairs() -> None:
+    scene, q = of_all_kinds()
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        state = scene.check_state(q + rng.normal(scale=0.2, size=q.size), rng.normal(size=q.size))
+        together = explain_pairs(scene, *state)
+        for pair, figures in zip(scene.pairs, together, strict=True):
+            (alone,) = explain_pairs(scene.with_pairs((pair,)), *state)
+            np.testing.assert_equal(astuple(figures), astuple(alone))
+
+
+def test_what_is_kept_of_a_pair_goes_with_it() -> None:
+    scene = sp.Scene(models.ball())
+    scene.add_contact(sp.Sphere(0.006, "ball"), models.plate(), law=LAW, name="c")
+    q = models.free_q([0.0, 0.0, 0.006])
+    before = scene.explain(q).pairs[0]
+    scene.replace_pair("c", law=sp.HuntCrossleyLaw(1e8, 1.5, 0.5))
+    after = scene.explain(q).pairs[0]
+    assert after.modelled != before.modelled
+    assert after.contact_time < before.contact_time
+
+
+class _Enough(Exception):
+    """Ends a run at its first glance."""
+
+
+@pytest.mark.parametrize(
+    ("integrator", "record_dt", "rows"),
+    [
+        (sp.SemiImplicitEuler(1e-5), None, "1.5e+06 rows"),
+        (sp.SemiImplicitEuler(1e-5), 1e-7, "1.5e+06 rows"),
+        (sp.Adaptive(), 1e-6, "1.5e+07 rows"),
+        (sp.SemiImplicitEuler(1e-5), 1e-3, ""),
+        (sp.SemiImplicitEuler(2e-5), None, ""),
+        (sp.Adaptive(), None, ""),
+    ],
+)
+def test_more_than_a_million_rows_are_announced(integrator, record_dt, rows) -> None:
+    def stop(_: float) -> None:
+        raise _Enough
+
+    simulation, q = sp.Simulation(sp.Scene(models.ball()), integrator), models.free_q([0, 0, 1])
+    with warnings.catch_warnings(record=True) as caught, suppress(_Enough):
+        warnings.simplefilter("always")
+        simulation.run(q, duration=15.0, record_dt=record_dt, progress=stop)
+    told = [str(one.message) for one in caught if "rows" in str(one.message)]
+    assert len(told) == bool(rows)
+    if told:
+        assert rows in told[0]
+        assert re.search(r"record_dt = 0.00[12] s", told[0])
+        assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("limit", ["_MANY_ROWS", "_MANY_BYTES"])
+def test_rows_of_error_control_are_announced_once_seen(limit: str, monkeypatch) -> None:
+    monkeypatch.setattr(advance, limit, 5)
+    scene = sp.Scene(models.ball())
+    with pytest.warns(sp.errors.SetupWarning, match=r"rows by t = .*record_dt = 0.001 s") as caught:
+        sp.Simulation(scene, sp.Adaptive(1e-8)).run(scene.neutral, duration=10.0)
+    assert [one.filename for one in caught] == [__file__]
+
+
+def test_a_run_whose_rows_fill_the_memory_ends_with_its_result(monkeypatch) -> None:
+    sizes = iter((0.0, 0.0, 1e18))
+    monkeypatch.setattr(advance, "_peak_memory", lambda: next(sizes))
+    scene = sp.Scene(models.ball())
+    with pytest.raises(sp.errors.RowsFillMemory, match=r"rows fill 1e\+09 GB") as caught:
+        sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(scene.neutral, duration=60.0)
+    assert 0 < caught.value.result.t[-1] == caught.value.t < 60

@@ -5,8 +5,10 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from tests import models
+from tests import models, urdf
+from tests.texts import DATA, text_of
 
 # A joint, its link, a sensor fixed to it, on that a flange with a tool fixed to it and a finger on
 # a joint: masses [kg], centers of mass [m] in the link, inertia about it.
@@ -19,31 +21,17 @@ PARTS = {
 BEYOND = ("flange", "tool", "finger")
 
 
-def _link(name):
-    mass, com, (a, b, c) = PARTS[name]
-    at = " ".join(map(str, com))
-    return f"""<link name="{name}"><inertial><origin xyz="{at}"/><mass value="{mass}"/>
-    <inertia ixx="{a}" iyy="{b}" izz="{c}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
-
-
-def _joint(name, kind, parent, child, xyz, rpy="0 0 0", axis="0 1 0"):
-    more = f'<axis xyz="{axis}"/><limit lower="-3" upper="3" effort="90" velocity="9"/>'
-    return f"""<joint name="{name}" type="{kind}"><origin xyz="{xyz}" rpy="{rpy}"/>
-    <parent link="{parent}"/><child link="{child}"/>{more if kind != "fixed" else ""}</joint>"""
-
-
-URDF = "\n".join(
-    [
-        '<robot name="arm"><link name="base"/>',
-        *map(_link, PARTS),
-        '<link name="tip"/>',
-        _joint("shoulder", "revolute", "base", "upper", "0 0 0.4", "0.3 0 0", "0 0.6 0.8"),
-        _joint("mount", "fixed", "upper", "flange", "0 0 0.3", "0.2 -0.4 0.7"),
-        _joint("grip", "fixed", "flange", "tool", "0.02 0 0.05", "0 0.5 0"),
-        _joint("knuckle", "revolute", "flange", "finger", "0 0.03 0.05"),
-        _joint("end", "fixed", "finger", "tip", "0 0 0.1"),
-        "</robot>",
-    ]
+URDF = urdf.robot(
+    urdf.link("base"),
+    *(urdf.link(name, urdf.inertial(mass, own, at)) for name, (mass, at, own) in PARTS.items()),
+    urdf.link("tip"),
+    urdf.joint(
+        "shoulder", "revolute", "base", "upper", at="0 0 0.4", rpy="0.3 0 0", axis="0 0.6 0.8"
+    ),
+    urdf.joint("mount", "fixed", "upper", "flange", at="0 0 0.3", rpy="0.2 -0.4 0.7"),
+    urdf.joint("grip", "fixed", "flange", "tool", at="0.02 0 0.05", rpy="0 0.5 0"),
+    urdf.joint("knuckle", "revolute", "flange", "finger", at="0 0.03 0.05"),
+    urdf.joint("end", "fixed", "finger", "tip", at="0 0 0.1"),
 )
 
 
@@ -78,57 +66,41 @@ def read(scene, q, controller, sensors, duration=0.0, **more):
     return sp.Simulation(scene, sp.Adaptive(), sensors).run(q, None, duration, controller, **more)
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize(
-    ("frame", "parts"),
-    [
-        ("mount", BEYOND),
-        ("flange", BEYOND),
-        ("grip", ("tool",)),
-        ("finger", ("finger",)),
-        ("shoulder", tuple(PARTS)),
-        ("upper", tuple(PARTS)),
-        ("base", tuple(PARTS)),
-    ],
-)
-def test_at_rest_it_reads_the_weight_beyond_it(seed, frame, parts):
-    model = arm()
-    q = np.random.default_rng(seed).uniform(-1.5, 1.5, model.nq)
-    result = read(sp.Scene(model), q, sp.GravityCompensation(), [sensor(frame)])
-    expected = weight(model, q, frame, parts)
-    assert np.abs(result.sensors["wrist"].values[0] - expected).max() < 1e-10
+ALL = tuple(PARTS)
+AT = {"mount": BEYOND, "flange": BEYOND, "grip": ("tool",), "finger": ("finger",)}
+AT |= {"shoulder": ALL, "upper": ALL, "base": ALL}
 
 
-@pytest.mark.parametrize("locked", [["knuckle"], ["shoulder"]])
-def test_a_locked_joint_changes_nothing(locked):
-    model = arm()
-    q = np.array([0.4, -0.7])
-    scene = sp.Scene(model, lock=locked, q_lock=q)
-    left = q[[k for k, name in enumerate(("shoulder", "knuckle")) if name not in locked]]
-    for frame, parts in (("mount", BEYOND), ("grip", ("tool",)), ("upper", tuple(PARTS))):
-        result = read(scene, left, sp.GravityCompensation(), [sensor(frame)])
-        expected = weight(model, q, frame, parts)
-        assert np.abs(result.sensors["wrist"].values[0] - expected).max() < 1e-10, frame
+def rest(scene, q, given):
+    """What a sensor reads of a robot that is held at rest."""
+    return read(scene, q, sp.GravityCompensation(), [given]).sensors[given.name].values[0]
 
 
-@pytest.mark.parametrize(("lock", "frame", "link"), [(["knuckle"], "knuckle", "finger")])
-def test_a_contact_on_the_frame_of_a_locked_joint_is_beyond_the_sensor(lock, frame, link):
+@pytest.mark.parametrize("lock", [(), ("knuckle",), ("shoulder",)])
+@pytest.mark.parametrize("frame", AT)
+def test_at_rest_it_reads_the_weight_beyond_it(frame, lock):
+    """Whatever is locked."""
+    for q in np.random.default_rng(0).uniform(-1.5, 1.5, (5, 2)):
+        scene = sp.Scene(arm(), lock=lock, q_lock=q if lock else None)
+        left = q[[name not in lock for name in ("shoulder", "knuckle")]]
+        expected = weight(arm(), q, frame, AT[frame])
+        assert np.abs(rest(scene, left, sensor(frame)) - expected).max() < 1e-10
+
+
+def test_a_contact_on_the_frame_of_a_locked_joint_is_beyond_the_sensor():
     """As that of a sphere on the link there, which is at the same place."""
-    model, q = arm(), np.array([0.4, -0.7])
-    center = poses(model, q)[link].translation
+    model, q, law = arm(), np.array([0.4, -0.7]), sp.ImpactLaw(1e6, 1.5)
+    center = poses(model, q)["finger"].translation
     plane = pin.SE3(np.eye(3), center - [0.01, 0.02, 0.02 - 3e-4])
     read_by = {}
-    for one in (None, frame, link):
-        scene = sp.Scene(model, lock=lock, q_lock=q)
+    for one in (None, "knuckle", "finger"):
+        scene = sp.Scene(model, lock=["knuckle"], q_lock=q)
         if one is not None:
-            scene.add_contact(
-                sp.Sphere(0.02, one), models.plate(), placement=plane, law=sp.ImpactLaw(1e6, 1.5)
-            )
-        result = read(scene, q[:1], sp.GravityCompensation(), [sensor()])
-        read_by[one] = result.sensors["wrist"].values[0]
-    assert np.abs(read_by[frame] - read_by[link]).max() < 1e-10
+            scene.add_contact(sp.Sphere(0.02, one), models.plate(), placement=plane, law=law)
+        read_by[one] = rest(scene, q[:1], sensor())
+    assert np.abs(read_by["knuckle"] - read_by["finger"]).max() < 1e-10
     # Of the pressed arm the shoulder moves: it is the contact's force that the sensor tells.
-    assert np.abs(read_by[frame] - read_by[None]).max() > 0.1
+    assert np.abs(read_by["knuckle"] - read_by[None]).max() > 0.1
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -136,20 +108,14 @@ def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     model, radius, depth = arm(), 0.02, 3e-4
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, model.nq)
     center = poses(model, q)["tip"].translation
-    law = sp.ImpactLaw(1e6, 1.5)
-    scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(radius, frame="tip"),
-        models.plate(),
-        placement=pin.SE3(np.eye(3), center - [0.01, 0.02, radius - depth]),
-        law=law,
-        method="facets",
-        name="tip-plate",
-    )
+    law, scene = sp.ImpactLaw(1e6, 1.5), sp.Scene(model)
+    place = pin.SE3(np.eye(3), center - [0.01, 0.02, radius - depth])
+    scene.add_contact(sp.Sphere(radius, "tip"), models.plate(), placement=place, law=law)
     data = model.createData()
     hold = pin.rnea(model, data, q, np.zeros(2), np.zeros(2), scene.external_forces(q))
     switch = sp.ContactSwitch(name="switch", frame="finger", threshold=1.0)
-    result = read(scene, q, lambda t, q, v, contacts: hold, [sensor(), sensor_of("tool"), switch])
+    tool = sp.ForceTorqueSensor(name="tool", frame="grip")
+    result = read(scene, q, lambda t, q, v, contacts: hold, [sensor(), tool, switch])
     pose = poses(model, q)["mount"]
     push = np.array([0.0, 0.0, law.normal_force(depth)])
     arm_of_force = center - [0, 0, radius] - pose.translation
@@ -164,30 +130,11 @@ def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     assert result.sensors["switch"].values.tolist() == [[1.0]]
 
 
-def sensor_of(name):
-    return sp.ForceTorqueSensor(name=name, frame={"tool": "grip"}[name])
-
-
-def one_link():
-    """A link swinging about an oblique axis, with a part fixed to it beyond "mount"."""
-    urdf = "\n".join(
-        [
-            '<robot name="swing"><link name="base"/>',
-            _link("upper"),
-            _link("tool"),
-            _joint("shoulder", "revolute", "base", "upper", "0 0 0", "0.3 0 0", "0 0.6 0.8"),
-            _joint("mount", "fixed", "upper", "tool", "0 0 0.3", "0.2 -0.4 0.7"),
-            "</robot>",
-        ]
-    )
-    return pin.buildModelFromXML(urdf)
-
-
 @pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.Implicit(), sp.RungeKutta4(1e-3)])
 def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
-    model = one_link()
-    rate = 250.0
-    scene = sp.Scene(model)
+    """The knuckle is locked, where it is straight."""
+    rate, model = 250.0, arm()
+    scene = sp.Scene(model, lock=["knuckle"])
     result = sp.Simulation(scene, integrator, [sensor(rate=rate)]).run(
         [0.9], [4.0], 0.4, record_dt=1 / rate
     )
@@ -195,42 +142,41 @@ def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
     assert np.allclose(log.t, result.t, rtol=0, atol=1e-12)
     gravity = np.array([0.0, 0.0, -9.81])
     for q, v, seen in zip(result.q, result.v, log.values, strict=True):
-        pose = poses(model, q)
-        axis = pose["shoulder"].rotation @ np.array([0.0, 0.6, 0.8])
+        pose = poses(model, np.append(q, 0.0))
+        axis, mount = pose["shoulder"].rotation @ np.array([0.0, 0.6, 0.8]), pose["mount"]
+        bodies = {}  # mass, center of mass from the shoulder and inertia about it
+        for name, (mass, com, own) in PARTS.items():
+            turn = pose[name].rotation
+            r = pose[name].act(np.array(com)) - pose["shoulder"].translation
+            bodies[name] = mass, r, turn @ np.diag(own) @ turn.T
         # About the fixed axis: the sum of m r^2 and the parts' own inertia; gravity's torque.
         inertia = torque = 0.0
-        for name in ("upper", "tool"):
-            mass, com, own = PARTS[name]
-            r = pose[name].act(np.array(com))
-            inertia += axis @ pose[name].rotation @ np.diag(own) @ pose[name].rotation.T @ axis
-            inertia += mass * (r @ r - (r @ axis) ** 2)
+        for mass, r, own in bodies.values():
+            inertia += axis @ own @ axis + mass * (r @ r - (r @ axis) ** 2)
             torque += axis @ np.cross(r, mass * gravity)
+        arm_of_mount = mount.translation - pose["shoulder"].translation
         spin, alpha = v[0] * axis, torque / inertia * axis
-        mass, com, own = PARTS["tool"]
-        center = pose["tool"].act(np.array(com))
-        acceleration = np.cross(alpha, center) + np.cross(spin, np.cross(spin, center))
-        force = mass * (acceleration - gravity)
-        about = pose["tool"].rotation @ np.diag(own) @ pose["tool"].rotation.T
-        moment = about @ alpha + np.cross(spin, about @ spin)
-        moment += np.cross(center - pose["mount"].translation, force)
-        turn = pose["mount"].rotation.T
-        assert np.allclose(seen, np.concatenate([turn @ force, turn @ moment]), rtol=0, atol=1e-9)
+        force, moment = np.zeros(3), np.zeros(3)
+        for mass, r, own in (bodies[name] for name in BEYOND):
+            acceleration = np.cross(alpha, r) + np.cross(spin, np.cross(spin, r))
+            push = mass * (acceleration - gravity)
+            force += push
+            moment += own @ alpha + np.cross(spin, own @ spin)
+            moment += np.cross(r - arm_of_mount, push)
+        expected = np.concatenate([mount.rotation.T @ force, mount.rotation.T @ moment])
+        assert np.allclose(seen, expected, rtol=0, atol=1e-9)
     assert np.abs(log.values).max() > 9
 
 
 def test_a_joint_torque_at_rest_carries_the_weight():
-    model = arm()
     q = np.array([0.4, -0.7])
-    names = ("shoulder", "knuckle")
-    sensors = [sp.JointTorqueSensor(name=name, joint=name) for name in names]
-    result = read(sp.Scene(model), q, sp.GravityCompensation(), sensors)
-    for name, axis, parts in (
-        ("shoulder", (0.0, 0.6, 0.8), tuple(PARTS)),
-        ("knuckle", (0.0, 1.0, 0.0), ("finger",)),
-    ):
-        wrench = weight(model, q, name, parts)
-        assert abs(result.sensors[name].values[0, 0] - wrench[3:] @ np.array(axis)) < 1e-10
-        assert result.sensors[name].columns == ("torque [N m]",)
+    tip = ("finger",)
+    for name, axis, parts in (("shoulder", [0, 0.6, 0.8], ALL), ("knuckle", [0, 1, 0], tip)):
+        given = sp.JointTorqueSensor(name=name, joint=name)
+        torque = weight(arm(), q, name, parts)[3:] @ axis
+        log = read(sp.Scene(arm()), q, sp.GravityCompensation(), [given]).sensors[name]
+        assert abs(log.values[0, 0] - torque) < 1e-10
+        assert log.columns == ("torque [N m]",)
 
 
 def test_a_push_from_outside_is_felt():
@@ -250,51 +196,110 @@ def test_a_push_from_outside_is_felt():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (sp.ForceTorqueSensor(name="s", frame="nowhere"), "nowhere"),
-        (sp.ForceTorqueSensor(name="s", frame="tip"), "frame = 'tip' has nothing beyond it"),
+        (sensor("nowhere"), "nowhere"),
+        (sensor("tip"), "frame = 'tip' has nothing beyond it"),
+        (sensor("ball"), "'ball' is a point on a link"),
         (sp.JointTorqueSensor(name="s", joint="mount"), "no joint 'mount'"),
+        (
+            sp.JointTorqueSensor(name="s", joint="ball_joint"),
+            "one degree of .*, this has 6",
+        ),
         (sp.ContactSwitch(name="s", contact="a", threshold=0), "no contact 'a'"),
         (sp.ContactSwitch(name="s", frame="finger", threshold=0), "has no contact on it"),
     ],
 )
-def test_what_the_scene_does_not_have_is_named(given, said):
+def test_what_cannot_be_measured_in_a_scene_is_named(given, said):
+    model = models.ball() if "ball" in repr(given) else arm()
     with pytest.raises(sp.SphshellError, match=said):
-        read(sp.Scene(arm()), [0.0, 0.0], None, [given])
-
-
-def test_a_point_on_a_link_divides_nothing():
-    with pytest.raises(sp.SphshellError, match="'ball' is a point on a link"):
-        read(sp.Scene(models.slider()), [0.0], None, [sensor("ball")])
-    free = sp.JointTorqueSensor(name="s", joint="ball_joint")
-    with pytest.raises(sp.SphshellError, match="must have one degree of freedom, this has 6"):
-        read(sp.Scene(models.ball()), models.free_q([0, 0, 0]), None, [free])
+        read(sp.Scene(model), pin.neutral(model), None, [given])
 
 
 def test_what_a_joint_adds_is_transmitted():
     """A wheel driven against damping and sliding dry friction, with a rotor: I times alpha."""
     model = models.empty(gravity=0.0)
-    link, rotor, damping, friction, tau = 0.3, 0.2, 0.4, 1.5, 5.0
+    link, rotor, damping, friction, joint = 0.3, 0.2, 0.4, 1.5, "wheel_joint"
     inertia = pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, link]))
     models.add_body(model, "wheel", pin.JointModelRZ(), inertia=inertia)
-    joint = "wheel_joint"
-    scene = sp.Scene(
-        model,
-        joints=sp.JointComponents(
-            damping={joint: damping},
-            friction={joint: sp.JointFriction(friction)},
-            armature={joint: rotor},
-            effort={joint: 4.0},
-        ),
+    joints = sp.JointComponents(
+        damping={joint: damping},
+        friction={joint: sp.JointFriction(friction)},
+        armature={joint: rotor},
+        effort={joint: 4.0},
     )
     torque = sp.JointTorqueSensor(name="torque", joint=joint, rate=200)
     sensors = [torque, sensor(joint, rate=200)]
-    simulation = sp.Simulation(scene, sp.Adaptive(rtol=1e-9), sensors)
-    result = simulation.run(
-        [0.0], [1.0], 0.2, lambda t, q, v, contacts: [tau], control_dt=0.05, record_dt=1 / 200
-    )
+    simulation = sp.Simulation(sp.Scene(model, joints=joints), sp.Adaptive(rtol=1e-9), sensors)
+    held = {"control_dt": 0.05, "record_dt": 1 / 200}
+    result = simulation.run([0.0], [1.0], 0.2, lambda t, q, v, contacts: [5.0], **held)
     # Cut to 4 N m by the motor's limit.
     alpha = (4.0 - damping * result.v[:, 0] - friction) / (link + rotor)
     seen = result.sensors["torque"].values[:, 0]
     assert np.allclose(seen[20:], link * alpha[20:], rtol=1e-6)
     assert np.allclose(result.sensors["wrist"].values[:, 5], seen, rtol=1e-12)
     assert result.stats.joints[joint].cut_time > 0.19
+
+
+def test_joints_that_mimic_others():
+    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
+    model = robots.load("panda", mimic=True).model
+    finger = model.names[model.njoints - 1]
+    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
+    force = rest(sp.Scene(model), q, sensor("panda_hand"))[:3]
+    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
+    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
+    turn = models.pose_of(model, q, "panda_hand").rotation
+    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
+    follower = sp.JointTorqueSensor(name="s", joint=finger)
+    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
+        read(sp.Scene(model), q, None, [follower])
+
+
+def test_the_drive_of_joints_that_follow_carries_them():
+    """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
+    model = pin.buildModelFromXML(text_of("robots/two_slides.urdf"), mimic=True)
+    drive = sp.JointTorqueSensor(name="drive", joint="first")
+    wrench = sp.ForceTorqueSensor(name="wrench", frame="two")
+    result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
+    assert abs(result.sensors["drive"].values[0, 0] - 9.81 * (1.0 + 2 * 0.5)) < 1e-12
+    assert abs(result.sensors["wrench"].values[0, 2] - 9.81 * 0.5) < 1e-12
+    # Let go, the first falls with g (1 + 1) / (1 + 4 0.5): the drive gives nothing.
+    fall = read(sp.Scene(model), [0.1], None, [drive, wrench])
+    assert abs(fall.sensors["drive"].values[0, 0]) < 1e-12
+    acceleration = -2 * 9.81 * (1.0 + 2 * 0.5) / (1.0 + 4 * 0.5)
+    assert abs(fall.sensors["wrench"].values[0, 2] - 0.5 * (acceleration + 9.81)) < 1e-12
+
+
+@pytest.mark.parametrize(("frame", "mass"), [("a", 6), ("j", 6), ("b", 5), ("c", 3)])
+def test_bodies_of_an_mjcf_file(frame, mass):
+    model = pin.buildModelFromMJCF(str(DATA / "robots" / "bodies_and_site.xml"))
+    scene = sp.Scene(model)
+    found = rest(scene, pin.neutral(model), sensor(frame))
+    assert np.allclose(found, [0, 0, 9.81 * mass, 0, 0, 0], rtol=0, atol=1e-10)
+    with pytest.raises(sp.SphshellError, match="'s' is a point on a link"):
+        read(scene, pin.neutral(model), None, [sensor("s")])
+
+
+@pytest.mark.parametrize("lock", [(), ("r/knuckle",), ("shoulder",)])
+def test_robots_that_were_joined(lock):
+    two = arm()
+    for k, frame in enumerate(two.frames):
+        two.frames[k].name = f"r/{frame.name}"
+    for k in range(1, two.njoints):
+        two.names[k] = f"r/{two.names[k]}"
+    both = pin.appendModel(arm(), two, 0, pin.SE3(np.eye(3), np.array([0.0, 1.0, 0.0])))
+    q = np.array([0.4, -0.7, 0.2, 0.9])
+    left = q[[name not in lock for name in list(both.names)[1:]]]
+    scene = sp.Scene(both, lock=lock, q_lock=q if lock else None)
+    for frame, posture in (("mount", q[:2]), ("r/mount", q[2:])):
+        assert np.abs(rest(scene, left, sensor(frame)) - weight(arm(), posture)).max() < 1e-10
+
+
+def test_nothing_holds_a_floating_base():
+    heavy = URDF.replace(urdf.link("base"), urdf.link("base", urdf.inertial(3.0)))
+    model = pin.buildModelFromXML(heavy, pin.JointModelFreeFlyer())
+    q = np.array([0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0, 0.4, -0.7])
+    sensors = [sensor("mount"), sp.ForceTorqueSensor(name="root", frame="base")]
+    simulation = sp.Simulation(sp.Scene(model), sp.Adaptive(), sensors)
+    result = simulation.run(q, np.linspace(-1, 1, model.nv), 0.1)
+    assert np.abs(result.sensors["root"].values).max() < 1e-12
+    assert np.abs(result.sensors["wrist"].values).max() > 0.1

@@ -46,10 +46,7 @@ def test_together_they_are_the_same_pairs() -> None:
     assert len(together.contacts(q, v)) == 4
     for a, b in zip(together.external_forces(q, v), alone.external_forces(q, v), strict=True):
         assert (a.vector == b.vector).all()
-    for a, b in zip(
-        together.contact_derivatives(q, v), alone.contact_derivatives(q, v), strict=True
-    ):
-        assert (a == b).all()
+    assert np.array_equal(together.contact_derivatives(q, v), alone.contact_derivatives(q, v))
 
 
 @pytest.mark.parametrize("method", ["smooth", "facets", "elements"])
@@ -61,13 +58,10 @@ def test_no_contact_is_missed_at_the_border_of_the_shell(method: str) -> None:
         scene_of(spheres, together=one, shell=shell, method=method, friction=None)
         for one in (True, False)
     )
-    rng = np.random.default_rng(0)
-    low, high = shell.box
-    met = 0
+    rng, (low, high), met = np.random.default_rng(0), shell.box, 0
     for _ in range(300):
         place = low + rng.uniform(-0.3, 1.3, 3) * (high - low)
-        turn = pin.Quaternion(rng.normal(size=4)).normalized().coeffs()
-        q = np.concatenate([place, turn])
+        q = np.concatenate([place, pin.Quaternion(rng.normal(size=4)).normalized().coeffs()])
         a, b = together.contacts(q), alone.contacts(q)
         assert (a.pair == b.pair).all()
         assert (a.depth == b.depth).all()
@@ -75,24 +69,20 @@ def test_no_contact_is_missed_at_the_border_of_the_shell(method: str) -> None:
     assert met > 50
 
 
-@pytest.mark.parametrize(
-    "integrator",
-    [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)],
-    ids=lambda one: type(one).__name__,
-)
+INTEGRATORS = [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)]
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: type(one).__name__)
 def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[no-untyped-def]
     # Falls, hits, tumbles.
     q, v = models.free_q([0.0, 0.0, 0.012]), np.array([0.3, 0.1, -0.5, 1.0, -2.0, 5.0])
-    ends = []
+    exact, ends = isinstance(integrator, sp.SemiImplicitEuler), []
     for together in (True, False):
-        scene = scene_of(pad(3), together=together)
-        result = sp.Simulation(scene, integrator).run(q, v, 0.05)
-        assert result.stats.pairs[scene.pairs[0].name].touches >= 0
+        result = models.run(scene_of(pad(3), together=together), integrator, q, v, 0.05)
         assert sum(figures.touches for figures in result.stats.pairs.values()) > 3
-        if not isinstance(integrator, sp.SemiImplicitEuler):
+        if not exact:
             testing.assert_energy_kept(result, 1e-5)
         ends.append(np.concatenate([result.q[-1], result.v[-1]]))
-    exact = isinstance(integrator, sp.SemiImplicitEuler)
     assert np.allclose(*ends, rtol=0, atol=1e-12 if exact else 2e-5)
 
 

@@ -13,14 +13,22 @@ from sphshell_pin import testing
 from sphshell_pin.errors import SetupWarning
 from tests.contact.test_planes import pose, scene_of
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_foundation_on_plane import FRICTIONS, box, thrown
-from tests.dynamics.test_planes import over_plane, reach_of, touching
+from tests.dynamics.test_planes import (
+    BOX,
+    FRICTIONS,
+    SPUN,
+    assert_at_rest,
+    box,
+    fallen,
+    over_plane,
+    reach_of,
+    touching,
+)
 from tests.meshes import cube, grid_plate
 from tests.models import linear_law
 
 LAW = sp.ImpactLaw(1e6, 1.5, 50.0, 1e-4)
 CROWN = 1e3  # its radius over the size of the shell
-SIDES = np.array([0.06, 0.05, 0.04])
 
 
 def prism(outline: np.ndarray, height: float) -> sp.Shell:
@@ -35,20 +43,21 @@ def prism(outline: np.ndarray, height: float) -> sp.Shell:
 
 
 TRIANGLE = np.array([[0.0, 0.0], [0.05, 0.0], [0.01, 0.03]])
-# What lies on a plane: a shell, and how it is turned.
+COIN, ROLLER = coal.Cylinder(0.02, 0.004), coal.Cylinder(0.02, 0.06)
+CONE, SLANT = coal.Cone(0.03, 0.06), np.pi / 2 + np.arctan2(0.03, 0.06)
+
+
+def solid(geometry: object) -> sp.Shell:
+    return sp.Shell.from_geometry(geometry, segments=48)
+
+
 SHELLS = {
     "box": (box, np.eye(3)),
     "box on an edge": (box, pin.utils.rotate("x", 0.6)),
     "wedge": (lambda: prism(TRIANGLE, 0.02), np.eye(3)),
-    "coin": (lambda: sp.Shell.from_geometry(coal.Cylinder(0.02, 0.004), segments=48), np.eye(3)),
-    "roller": (
-        lambda: sp.Shell.from_geometry(coal.Cylinder(0.02, 0.06), segments=48),
-        pin.utils.rotate("x", np.pi / 2),
-    ),
-    "cone": (
-        lambda: sp.Shell.from_geometry(coal.Cone(0.03, 0.06), segments=48),
-        pin.utils.rotate("y", np.pi / 2 + np.arctan2(0.03, 0.06)),
-    ),
+    "coin": (lambda: solid(COIN), np.eye(3)),
+    "roller": (lambda: solid(ROLLER), pin.utils.rotate("x", np.pi / 2)),
+    "cone": (lambda: solid(CONE), pin.utils.rotate("y", SLANT)),
     "sheet": (lambda: sp.Shell(*grid_plate(2, 2, 0.05)), np.eye(3)),
 }
 
@@ -165,7 +174,7 @@ def test_one_corner_has_its_own_depth() -> None:
 # Shell, inertia, and how they fall: on a corner, with a spin, or, as a coin or cone that is thrown
 # rolls on its rim without loss, put down obliquely.
 SOLIDS = {
-    "box": (box, pin.Inertia.FromBox(0.2, *SIDES), (0.5, 0.3), [0.1, 0, -0.2, 1.0, 2.0, 5.0]),
+    "box": (box, BOX, (0.5, 0.3), SPUN),
     "coin": (SHELLS["coin"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.004), (0.3, 0.1), [0] * 6),
     "cone": (SHELLS["cone"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.06), (2.03, 0.0), [0] * 6),
 }
@@ -179,30 +188,18 @@ FALLS += [(name, one, FRICTIONS[1]) for name in ("coin", "cone") for one in INTE
 @pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
 def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction) -> None:
     """They fall, rattle, and lie still; the energies close."""
-    make, inertia, turned, v = SOLIDS[name]
-    shell = make()
-    scene = thrown(shell, inertia, LAW, friction)
-    turn = pin.rpy.rpyToMatrix(*turned, 0.2)
-    height = 0.005 - (shell.vertices @ turn[2]).min()
-    q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
+    make, inertia, turn, v = SOLIDS[name]
     duration = 1.0 if name == "box" else 0.5
-    result = sp.Simulation(scene, integrator).run(q, np.array(v, float), duration, record_dt=1e-3)
-    assert result.stats.steps <= 20_000 * duration
-    assert np.abs(result.v[-1]).max() < 1e-6
-    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
+    more = {"v": v, "turn": turn, "duration": duration, "record_dt": 1e-3}
+    assert_at_rest(fallen(make, inertia, LAW, friction, integrator, **more), 20_000 * duration)
 
 
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction(0.4, 0.4, 0.01, 0.1)])
 def test_fixed_steps_resolve_where_damping_and_friction_come_on(friction) -> None:
     """Damping comes on within two steps of the fall, friction within some at the impact."""
-    sides = (0.1, 0.06, 0.04)
-    law = sp.ImpactLaw(1e5, 1.0, 20.0, 1e-4)
-    scene = thrown(box(sides), pin.Inertia.FromBox(0.5, *sides), law, friction)
-    turn = pin.rpy.rpyToMatrix(0.5, 0.3, 0.2)
-    height = 0.005 - (box(sides).vertices @ turn[2]).min()
-    q = np.r_[0, 0, height, pin.Quaternion(turn).coeffs()]
-    v = [0.1, 0, -0.2, 1.0, 2.0, 5.0]
-    result = sp.Simulation(scene, sp.RungeKutta4(5e-5)).run(q, v, 0.2, record_dt=1e-3)
+    sides, law = (0.1, 0.06, 0.04), sp.ImpactLaw(1e5, 1.0, 20.0, 1e-4)
+    inertia, more = pin.Inertia.FromBox(0.5, *sides), {"duration": 0.2, "record_dt": 1e-3}
+    result = fallen(lambda: box(sides), inertia, law, friction, sp.RungeKutta4(5e-5), **more)
     assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
 
 

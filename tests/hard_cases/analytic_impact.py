@@ -7,7 +7,6 @@ Undamped, `F = k depth^e` gives back all energy; the largest depth is
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,7 +14,7 @@ import sphshell_pin as sp
 from sphshell_pin.study.report.closed_forms import FALL, bounce
 from tests import models
 from tests.hard_cases import balls
-from tests.hard_cases.verdict import Verdict, Verdicts, case, compare
+from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 PRECISE = sp.Adaptive(1e-9)
 GAP = 1e-4
@@ -24,25 +23,18 @@ FIXED = ((sp.SemiImplicitEuler, 1), (sp.LinearlyImplicitEuler, 1), (sp.RungeKutt
 BY_TOLERANCE = ((sp.Adaptive, (1e-4, 1e-9)), (sp.Implicit, (1e-3, 1e-7)))
 
 
-@dataclass(frozen=True)
-class Impact:
-    """When the ball touched and how long [s], its largest depth [m], speed back over speed."""
+def impact(law: sp.ImpactLaw, speed: float, expected: float) -> tuple[float, ...]:
+    """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch.
 
-    touch: float
-    duration: float
-    depth: float
-    restitution: float
-
-
-def impact(law: sp.ImpactLaw, speed: float, expected: float) -> Impact:
-    """Shoot the ball at the plate; `expected` [s] is about how long it stays in touch."""
+    Return when it touched and how long [s], its largest depth [m], speed back over speed.
+    """
     scene = balls.scene_of(models.square(), law, model=balls.free_ball(gravity=0.0))
-    q0, v0 = balls.state([0.1, 0.03, balls.RADIUS + GAP], [0.0, 0.0, -speed], [0.0, 0.0, 0.0])
+    q0, v0 = balls.state([0.1, 0.03, balls.RADIUS + GAP], [0.0, 0.0, -speed])
     duration = GAP / speed + 2 * expected
     result = sp.Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=expected / 4000)
     (touch,), (left,) = balls.event_times(result, "touch"), balls.event_times(result, "lift_off")
-    back = float(balls.velocities(result)[-1, 2])
-    return Impact(touch, left - touch, float(balls.RADIUS - result.q[:, 2].min()), back / speed)
+    depth, back = balls.RADIUS - result.q[:, 2].min(), balls.velocities(result)[-1, 2]
+    return touch, left - touch, float(depth), float(back) / speed
 
 
 def touch_time(exponent: float, depth: float, speed: float) -> float:
@@ -63,27 +55,34 @@ def undamped() -> Verdicts:
         e = law.exponent
         depth = ((e + 1) * balls.MASS * speed**2 / (2 * law.stiffness)) ** (1 / (e + 1))
         duration = touch_time(e, depth, speed)
-        seen = impact(law, speed, duration)
         tried = f"{title}, {speed:g} m/s"
-        yield compare("time of the touch", tried, "gap / v", GAP / speed, seen.touch, 1e-6)
-        yield compare("time in touch", tried, "2 I depth / v", duration, seen.duration, 1e-6)
-        yield compare(
-            "largest depth", tried, "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth, seen.depth, 1e-6
-        )
-        yield compare("restitution", tried, "1", 1.0, seen.restitution, 1e-6)
+        for (what, formula, expected), seen in zip(
+            (
+                ("time of the touch", "gap / v", GAP / speed),
+                ("time in touch", "2 I depth / v", duration),
+                ("largest depth", "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth),
+                ("restitution", "1", 1.0),
+            ),
+            impact(law, speed, duration),
+            strict=True,
+        ):
+            yield compare(what, tried, formula, expected, seen, 1e-6)
+
+
+def hops(stiffness: float, height: float, end: float, integrator: object) -> tuple[float, float]:
+    """Return height [m] and speed [m/s] of a ball `end` [s] after its release on a spring."""
+    model = models.slider(balls.GRAVITY, balls.MASS)
+    scene = balls.scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
+    result = sp.Simulation(scene, integrator).run([balls.RADIUS + height], None, end)
+    return float(result.q[-1, 0] - balls.RADIUS), float(result.v[-1, 0])
 
 
 def bouncing_error(integrator: object) -> float:
     """Return the error after five bounces, in the sixth flight, over the height of fall."""
-    height, stiffness, end = FALL, 1e4, 0.75
-    model = models.slider(balls.GRAVITY, balls.MASS)
-    scene = balls.scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
-    result = sp.Simulation(scene, integrator).run([balls.RADIUS + height], None, end)
-    z, speed = bounce(np.array(end), stiffness)
-    fall = math.sqrt(2 * balls.GRAVITY * height)
-    return math.hypot(
-        (result.q[-1, 0] - balls.RADIUS - z) / height, (result.v[-1, 0] - speed) / fall
-    )
+    stiffness, end = 1e4, 0.75
+    at, speed = hops(stiffness, FALL, end, integrator)
+    z, exact = bounce(np.array(end), stiffness)
+    return math.hypot((at - z) / FALL, (speed - exact) / math.sqrt(2 * balls.GRAVITY * FALL))
 
 
 def oscillation_error(integrator: object) -> float:
@@ -91,14 +90,9 @@ def oscillation_error(integrator: object) -> float:
     stiffness, end = 1e4, 0.05
     omega, sag = math.sqrt(stiffness / balls.MASS), balls.MASS * balls.GRAVITY / stiffness
     start = 0.8 * sag
-    model = models.slider(balls.GRAVITY, balls.MASS)
-    scene = balls.scene_of(models.square(), sp.ImpactLaw(stiffness, 1.0), model=model)
-    result = sp.Simulation(scene, integrator).run([balls.RADIUS - sag + start], None, end)
-    z, speed = start * math.cos(omega * end), -start * omega * math.sin(omega * end)
-    return math.hypot(
-        (result.q[-1, 0] - balls.RADIUS + sag - z) / start,
-        (result.v[-1, 0] - speed) / (start * omega),
-    )
+    at, speed = hops(stiffness, start - sag, end, integrator)
+    z, exact = math.cos(omega * end), -math.sin(omega * end)
+    return math.hypot((at + sag) / start - z, speed / (start * omega) - exact)
 
 
 def order_by_step(error, integrator, steps):
@@ -107,17 +101,20 @@ def order_by_step(error, integrator, steps):
     return math.log(coarse / fine) / math.log(steps[0] / steps[1])
 
 
-def order_by_tolerance(error, integrator, span):
-    """Return the power of the tolerance with which the error falls, and the last error."""
-    tolerances = np.geomspace(*span, 6)
+def by_tolerance(error, integrator, span, tried, law, unit):
+    """Yield the verdicts on the power of the tolerance with which an error falls, and the last.
+
+    A higher power is no fault.
+    """
+    tolerances, name = np.geomspace(*span, 6), integrator.__name__
     errors = [error(integrator(float(rtol))) for rtol in tolerances]
-    return float(np.polyfit(np.log(tolerances), np.log(errors), 1)[0]), errors[-1]
-
-
-def falls(name: str, tried: str, power: float) -> Verdict:
-    """Return the verdict on a power of the tolerance; a higher one is no fault."""
-    law = "error ~ rtol^p, p about 0.8 to 1, or better"
-    return Verdict.on(name, tried, law, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
+    power = float(np.polyfit(np.log(tolerances), np.log(errors), 1)[0])
+    about, what = (
+        "error ~ rtol^p, p about 0.8 to 1, or better",
+        f"{name}, rtol {span[0]:g} to {span[1]:g}",
+    )
+    yield Verdict.on(what, tried, about, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
+    yield at_most(f"{name}({span[1]:g}){unit}", tried, law, errors[-1], 1e2 * span[1])
 
 
 @case("order of the fixed steps")
@@ -132,19 +129,8 @@ def fixed_orders() -> Verdicts:
 @case("error against tolerance")
 def tolerances() -> Verdicts:
     for integrator, span in BY_TOLERANCE:
-        for tried, error in (
-            ("ball that bobs on a spring", oscillation_error),
-            ("five bounces on a spring", bouncing_error),
+        for tried, error, law in (
+            ("ball that bobs on a spring", oscillation_error, "cosine"),
+            ("five bounces on a spring", bouncing_error, "closed form of flights and touches"),
         ):
-            power, last = order_by_tolerance(error, integrator, span)
-            name = f"{integrator.__name__}, rtol {span[0]:g} to {span[1]:g}"
-            yield falls(name, tried, power)
-            yield compare(
-                f"{integrator.__name__}({span[1]:g})",
-                tried,
-                "closed form of flights and touches" if error is bouncing_error else "cosine",
-                0.0,
-                last,
-                1e2 * span[1],
-                scale=1.0,
-            )
+            yield from by_tolerance(error, integrator, span, tried, law, "")

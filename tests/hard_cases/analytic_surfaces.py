@@ -11,18 +11,11 @@ import math
 import numpy as np
 
 import sphshell_pin as sp
-from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.swing import ball_model, downward_crossings, mean_period
 from tests.hard_cases import balls, surfaces
 from tests.hard_cases.verdict import Verdicts, at_most, case, compare
 
-STILL = np.zeros(3)
 DOME = 0.040
-
-
-def period_along_x(result: Result, velocity: Array, periods: int) -> float:
-    return mean_period(result.t, result.q[:, 0], velocity[:, 0], periods)
 
 
 @case("leaves a dome")
@@ -31,23 +24,19 @@ def dome() -> Verdicts:
     # Strong damping would let the ball off before its depth is zero.
     law, depth = balls.spring(1e8, ratio=0.02), balls.MASS * balls.GRAVITY / 1e8
     for speed, rolls in ((0.05, True), (0.4, True), (0.05, False)):
-        scene = balls.scene_of(
-            surfaces.sphere(DOME), law, balls.bristle(1e4, 1e8) if rolls else None
-        )
+        friction = balls.bristle(1e4, 1e8) if rolls else None
+        scene = balls.scene_of(surfaces.sphere(DOME), law, friction)
         arm, b = DOME + balls.RADIUS, balls.beta() if rolls else 0.0
         expected = (2 + (1 + b) * speed**2 / (balls.GRAVITY * arm)) / (3 + b)
-        q0, v0 = balls.state([0.0, 0.0, arm - depth], [speed, 0.0, 0.0], STILL)
+        q0, v0 = balls.state([0.0, 0.0, arm - depth], [speed, 0.0, 0.0])
         v0[4] = speed / (balls.RADIUS - depth) if rolls else 0.0
         result = sp.Simulation(scene, balls.PRECISE).run(q0, v0, 1.0, record_dt=1e-4)
         left = balls.event_times(result, "lift_off")[0]
-        center, _ = balls.center_at(result, left)
+        center = [np.interp(left, result.t, column) for column in result.q[:, :3].T]
         seen = float(center[2] / np.linalg.norm(center))
         tried = f"R = 4 r, v0 = {speed:g} m/s, {'rolling' if rolls else 'frictionless'}"
-        formula = (
-            "cos = (10 + 7 v0^2 / (g (R + r))) / 17"
-            if rolls
-            else "cos = (2 + v0^2 / (g (R + r))) / 3"
-        )
+        formula = "cos = (10 + 7 v0^2 / (g (R + r))) / 17"
+        formula = formula if rolls else "cos = (2 + v0^2 / (g (R + r))) / 3"
         yield compare("cosine at lift-off", tried, formula, expected, seen, 1e-4)
 
 
@@ -71,7 +60,7 @@ def tautochrone() -> Verdicts:
         result = sp.Simulation(scene, balls.PRECISE).run(
             points[0] - depth * normals[0], None, 2.35 * expected, record_dt=1e-3
         )
-        periods.append(period_along_x(result, result.v, 2))
+        periods.append(mean_period(result.t, result.q[:, 0], result.v[:, 0], 2))
         tried = f"a = 50 mm, from phi = {degrees} deg"
         law = "4 pi sqrt(a / g)"
         yield compare("period", tried, law, expected, periods[-1], 1e-5)
@@ -89,9 +78,8 @@ def cone() -> Verdicts:
         out = 0.035
         # Along the normal, up and inward: N sin = m g.
         depth = balls.MASS * balls.GRAVITY / (sine * balls.STIFF)
-        height = (out + (balls.RADIUS - depth) * cosine) / math.tan(half) + (
-            balls.RADIUS - depth
-        ) * sine
+        reach = balls.RADIUS - depth
+        height = (out + reach * cosine) / math.tan(half) + reach * sine
         orbit = math.sqrt(balls.GRAVITY / (math.tan(half) * out))
         push = 2e-3 * orbit * out
         center = np.array([out, 0.0, height])
@@ -109,14 +97,7 @@ def cone() -> Verdicts:
         along = np.diff(np.interp(crossings[[0, 4]], result.t, angle))[0]
         turned = along / (crossings[4] - crossings[0])
         tried = f"half angle {degrees} deg, orbit of 35 mm"
-        yield compare(
-            "orbit [rad/s]", tried, "sqrt(g / (tan(half angle) radius))", orbit, turned, 1e-4
-        )
-        yield compare(
-            "radial / orbit frequency",
-            tried,
-            "sqrt(3) sin(half angle)",
-            expected,
-            8 * math.pi / along,
-            1e-4,
-        )
+        law = "sqrt(g / (tan(half angle) radius))"
+        yield compare("orbit [rad/s]", tried, law, orbit, turned, 1e-4)
+        law, seen = "sqrt(3) sin(half angle)", 8 * math.pi / along
+        yield compare("radial / orbit frequency", tried, law, expected, seen, 1e-4)

@@ -13,12 +13,11 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
-from tests.rolling import PRECISE, RATIO, Ball, state, turned, velocities
+from tests.rolling import PRECISE, RATIO, Ball, state, velocities
 
 __all__ = [
-    "BALL", "GRAVITY", "INERTIA", "MASS", "PRECISE", "RADIUS", "RATIO", "STIFF", "beta", "bristle",
-    "center_at", "event_times", "free_ball", "scene_of", "spins", "spring", "state", "tilted",
-    "turned", "velocities",
+    "GRAVITY", "INERTIA", "MASS", "PRECISE", "RADIUS", "STIFF", "beta", "bristle", "event_times",
+    "free_ball", "scene_of", "spring", "state", "tilted", "velocities",
 ]  # fmt: skip
 BALL = Ball(MASS, RADIUS)
 INERTIA = BALL.inertia
@@ -41,22 +40,6 @@ def bristle(mu: float, stiffness: float = STIFF, mass: float | None = None) -> s
 def tilted(angle: float) -> pin.SE3:
     """Return the placement of a slope that falls along +x by `angle` [rad]."""
     return pin.SE3(pin.utils.rotate("y", angle), np.zeros(3))
-
-
-def spins(result: Result) -> Array:
-    """Return the angular velocity (n, 3) of the free ball in the world [rad/s]."""
-    return turned(result.q[:, 3:7], result.v[:, 3:6])
-
-
-def center_at(result: Result, t: float) -> tuple[Array, Array]:
-    """Return the free ball's center and velocity at `t` [s], by Hermite's cubic between rows."""
-    row = int(np.clip(np.searchsorted(result.t, t) - 1, 0, len(result.t) - 2))
-    step = result.t[row + 1] - result.t[row]
-    u = (t - result.t[row]) / step
-    x, v = result.q[row : row + 2, :3], velocities(result)[row : row + 2] * step
-    bend = 3 * (x[1] - x[0]) - 2 * v[0] - v[1], 2 * (x[0] - x[1]) + v[0] + v[1]
-    center = x[0] + u * (v[0] + u * (bend[0] + u * bend[1]))
-    return center, (v[0] + u * (2 * bend[0] + 3 * u * bend[1])) / step
 
 
 def event_times(result: Result, kind: str) -> list[float]:

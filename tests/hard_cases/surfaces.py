@@ -52,15 +52,6 @@ def sphere(radius: float, side: float = SIDE) -> Shell:
     return shell_of(Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T))
 
 
-CYLINDER = unit.TUBE * RADIUS
-
-
-def cylinder(side: float = SIDE) -> Shell:
-    """Open cylinder of radius CYLINDER round z, as long as wide."""
-    vertices, triangles, normals = unit.cylinder_mesh(side)
-    return shell_of(Mesh(vertices * RADIUS, triangles, normals))
-
-
 def cone(half_angle: float, low: float, high: float, side: float = SIDE) -> Shell:
     """Cone round z, apex at the origin, open upward; between the heights `low` and `high`."""
     sine, cosine = math.sin(half_angle), math.cos(half_angle)

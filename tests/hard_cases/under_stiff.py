@@ -21,23 +21,13 @@ RADIUS, MASS, SPEED = 0.01, 0.2, 3.0
 
 def scene_of(depth: float, solid: bool) -> sp.Scene:
     """Return a scene whose linear law would stop the ball at `depth` [m], without end."""
-    law = sp.ImpactLaw(MASS * (SPEED / depth) ** 2, 1.0)
-    if not solid:
-        shell = models.plate(20 * RADIUS)
-        return models.on_plate(models.slider(0.0, MASS), law, radius=RADIUS, shell=shell)
-    side = 20 * RADIUS
-    shell = sp.Shell.from_geometry(coal.Box(side, side, side), side="outside")
-    placement = pin.SE3(np.eye(3), np.array([0.01 * side, 0.02 * side, -side / 2]))
-    model = models.slider(0.0, MASS)
-    return models.on_plate(model, law, radius=RADIUS, shell=shell, placement=placement)
-
-
-def shoot(scene: sp.Scene, depth: float, above: bool, integrator: Any) -> sp.Result:
-    """Shoot the ball from 1.5 r above or below; until it would be clear again."""
-    way = 1.0 if above else -1.0
-    q, v = np.array([1.5 * RADIUS * way]), np.array([-SPEED * way])
-    duration = (1.5 * RADIUS + math.pi * depth) / SPEED
-    return sp.Simulation(scene, integrator).run(q, v, duration)
+    law, side, place = sp.ImpactLaw(MASS * (SPEED / depth) ** 2, 1.0), 20 * RADIUS, None
+    shell = models.plate(side)
+    if solid:
+        shell = sp.Shell.from_geometry(coal.Box(side, side, side), side="outside")
+        place = pin.SE3(np.eye(3), side * np.array([0.01, 0.02, -0.5]))
+    more = {"radius": RADIUS, "shell": shell, "placement": place}
+    return models.on_plate(models.slider(0.0, MASS), law, **more)
 
 
 def expected_speed(depth: float) -> float:
@@ -50,26 +40,19 @@ def expected_speed(depth: float) -> float:
     return -SPEED * math.sqrt(1 - (2 * RADIUS / depth) ** 2)
 
 
-def warns(depth: float) -> Verdict:
-    """Return whether it is said before the run."""
-    scene = scene_of(depth, solid=False)
-    said = scene.explain(np.array([1.5 * RADIUS]), np.array([-SPEED])).warnings
-    warned = any("cannot stop the sphere" in warning for warning in said)
-    tried = f"depth {depth / RADIUS:g} r"
-    return at_most("under-stiff law", tried, "explain warns of it", float(not warned), 0)
-
-
 def judge(integrator: Any, depth: float, solid: bool, above: bool, bound: float) -> Verdicts:
     """Return the events of the run, and the speed after it."""
     scene = scene_of(depth, solid)
     tried = f"{type(integrator).__name__}, depth {depth / RADIUS:g} r, "
     tried += "solid" if solid else f"sheet from {'above' if above else 'below'}"
-    result = shoot(scene, depth, above, integrator)
+    # From 1.5 r above or below, until it would be clear again.
+    way, duration = 1.0 if above else -1.0, (1.5 * RADIUS + math.pi * depth) / SPEED
+    result = sp.Simulation(scene, integrator).run([1.5 * RADIUS * way], [-SPEED * way], duration)
     due = {"touch", "deep"} if solid else {"touch", "deep", "through"}
     missing = sorted(due - {event.kind for event in result.events})
     law = f"events {', '.join(sorted(due))}"
     found = ", ".join(f"no {kind}" for kind in missing) or "all"
-    speed = float(result.v[-1, 0]) * (1.0 if above else -1.0)
+    speed = float(result.v[-1, 0]) * way
     right = expected_speed(depth)
     moved = "comes back as fast" if right > 0 else "goes through, v^2 - k (2 r)^2 / m left"
     yield Verdict.on("under-stiff law", tried, law, "all", found, len(missing), 0)
@@ -80,7 +63,10 @@ def judge(integrator: Any, depth: float, solid: bool, above: bool, bound: float)
 def under_stiff() -> Verdicts:
     depths = (1.5 * RADIUS, 3 * RADIUS)
     for depth in depths:
-        yield warns(depth)
+        said = scene_of(depth, solid=False).explain([1.5 * RADIUS], [-SPEED]).warnings
+        silent = not any("cannot stop the sphere" in warning for warning in said)
+        tried = f"depth {depth / RADIUS:g} r"
+        yield at_most("under-stiff law", tried, "explain warns of it", float(silent), 0)
     for integrator, bound in (
         (sp.Adaptive(), 1e-4),
         (sp.Implicit(), 1e-2),

@@ -27,8 +27,7 @@ def of_mujoco(name):
     """Return MuJoCo's model, its data in some state, and the mass matrix there."""
     with silent(mujoco):
         model = mujoco.MjModel.from_xml_path(str(FOLDER / name))
-    data = mujoco.MjData(model)
-    rng = np.random.default_rng(7)
+    data, mass, rng = mujoco.MjData(model), np.zeros((model.nv, model.nv)), np.random.default_rng(7)
     data.qpos[:] = model.qpos0 + 0.3 * rng.normal(size=model.nq)
     mujoco.mj_normalizeQuat(model, data.qpos)
     data.qvel[:] = rng.normal(size=model.nv)
@@ -36,7 +35,6 @@ def of_mujoco(name):
     model.body_gravcomp[:] = 0
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     mujoco.mj_forward(model, data)
-    mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     return model, data, mass
 
@@ -69,9 +67,7 @@ def state(model, theirs, data):
 def test_mass_and_forces_are_those_of_mujoco(name):
     (theirs, told, their_mass), model = of_mujoco(name), load(name).model
     q, v, to_mujoco = state(model, theirs, told)
-    data = model.createData()
-    upper = np.triu(pin.crba(model, data, q))
-    mass = upper + np.triu(upper, 1).T
+    mass = mass_matrix(model, q)
     expected = to_mujoco.T @ their_mass @ to_mujoco
     assert np.allclose(mass, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
     # Of a free joint, MuJoCo's acceleration is that of the linear velocity in the world's axes.
@@ -80,7 +76,7 @@ def test_mass_and_forces_are_those_of_mujoco(name):
         if kind == FREE:
             at = joint.idx_v
             turning[at : at + 3] = -np.cross(v[at + 3 : at + 6], v[at : at + 3])
-    forces = pin.rnea(model, data, q, v, turning) - model.armature * turning
+    forces = pin.rnea(model, model.createData(), q, v, turning) - model.armature * turning
     expected = to_mujoco.T @ told.qfrc_bias
     assert np.allclose(forces, expected, rtol=0, atol=1e-12 * max(np.abs(expected).max(), 1.0))
 
@@ -123,35 +119,28 @@ def test_joints_have_the_names_and_numbers_of_the_file(name):
 
 
 def test_equalities_of_joints_are_mimic_joints():
+    """tip_joint, the first in the tree, is the coordinate: half of follow = 0.1 + 1.2 drive."""
     model = load("chained_fingers.xml", mimic=True).model
-    rules = mimics(model)
-    # tip_joint is the first in the tree, and so the coordinate: it is half of what follow does,
-    # follow is 0.1 + 1.2 drive.
-    assert set(rules) == {"drive", "follow"}
-    assert rules["follow"].ratio == pytest.approx(2.0)
-    assert rules["drive"].ratio == pytest.approx(2 / 1.2)
-    assert rules["drive"].offset == pytest.approx(-0.1 / 1.2)
     assert (model.nq, model.nv) == (2, 2)
-    # The stops are those of the joint that drives the others, at tip = (0.1 + 1.2 drive) / 2.
+    ratios = {name: (rule.ratio, rule.offset) for name, rule in mimics(model).items()}
+    assert ratios == {
+        "follow": pytest.approx((2.0, 0.0)),
+        "drive": pytest.approx((2 / 1.2, -0.1 / 1.2)),
+    }
+    # The stops are those of the joint that drives the others.
     at = model.joints[model.getJointId("tip_joint")].idx_q
-    expected = 0.5 * (0.1 + 1.2 * np.deg2rad([-10, 80]))
     limits = model.lowerPositionLimit[at], model.upperPositionLimit[at]
-    assert np.allclose(limits, expected, rtol=1e-12)
+    assert np.allclose(limits, 0.5 * (0.1 + 1.2 * np.deg2rad([-10, 80])), rtol=1e-12)
 
 
-def test_keys_are_poses():
-    robot = load("quadruped.xml", pose="stand")
-    assert np.allclose(robot.q0[:7], [0, 0, 0.3, 0, 0, 0, 1])
-    assert np.allclose(robot.q0[7:], [0.5, -1, 0.5, -1, -0.5, 0, -1])
+def test_keys_are_poses_and_without_one_it_starts_as_drawn():
+    stand = [0, 0, 0.3, 0, 0, 0, 1, 0.5, -1, 0.5, -1, -0.5, 0, -1]
+    assert np.allclose(load("quadruped.xml", pose="stand").q0, stand)
     assert np.allclose(load("reference.xml", pose="home").q0, [0.5, 0.6])
-
-
-def test_without_a_pose_it_starts_as_drawn():
     assert np.allclose(load("reference.xml").q0, [0.2, np.pi / 6])
-    robot = load("free.xml")
     turn = pin.exp3(np.pi / 6 * np.array([1, 2, 0]) / np.sqrt(5))
     drawn = pin.SE3ToXYZQUAT(pin.SE3(turn, np.array([0, 0, 0.5])))
-    assert np.allclose(robot.q0, [*drawn, 0.0])
+    assert np.allclose(load("free.xml").q0, [*drawn, 0.0])
 
 
 def test_what_is_not_modeled_is_said():
@@ -168,6 +157,9 @@ def test_what_is_not_modeled_is_said():
         assert words in said
 
 
+INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+
+
 def written(tmp_path, inside, head=""):
     path = tmp_path / "r.xml"
     path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody></mujoco>")
@@ -181,25 +173,23 @@ ARM = (
 )
 
 
-@pytest.mark.parametrize(
-    ("equality", "words"),
-    [
-        (
-            '<connect name="pin" body1="b" body2="c" anchor="0 0 0"/>',
-            r"loop that <connect> 'pin' closes between 'b' and 'c', of the joints 'j1', 'j2', 'j3'",
-        ),
-        ('<weld body1="b"/>', r"<weld> closes between 'b' and 'world', of the joints 'j1', 'j2'"),
-        ('<joint joint1="j1" joint2="j2" polycoef="0 1 2"/>', r"'j1' follow 'j2' by a polynomial"),
-        ('<joint joint1="j1" polycoef="0.5"/>', r"holds joint 'j1' at 0.5 \(lock it"),
-        (
-            '<tendon tendon1="t"/></equality><tendon><fixed name="t"><joint joint="j1" coef="1"/>'
-            "</fixed></tendon><equality>",
-            r"<tendon> of <equality>",
-        ),
-    ],
+TENDON = (
+    '<tendon tendon1="t"/></equality><tendon><fixed name="t"><joint joint="j1" coef="1"/>'
+    "</fixed></tendon><equality>"
 )
-def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality, words):
-    path = written(tmp_path, ARM)
+COUPLED = {
+    '<connect name="pin" body1="b" body2="c" anchor="0 0 0"/>': "loop that <connect> 'pin' closes "
+    "between 'b' and 'c', of the joints 'j1', 'j2', 'j3'",
+    '<weld body1="b"/>': "<weld> closes between 'b' and 'world', of the joints 'j1', 'j2'",
+    '<joint joint1="j1" joint2="j2" polycoef="0 1 2"/>': "'j1' follow 'j2' by a polynomial",
+    '<joint joint1="j1" polycoef="0.5"/>': r"holds joint 'j1' at 0.5 \(lock it",
+    TENDON: "<tendon> of <equality>",
+}
+
+
+@pytest.mark.parametrize("equality", COUPLED)
+def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality):
+    words, path = COUPLED[equality], written(tmp_path, ARM)
     end = f"<equality>{equality}</equality></mujoco>"
     path.write_text(path.read_text().replace("</mujoco>", end))
     with pytest.raises(robots.RobotError, match=rf"not supported: .*{words}.*mimic = false"):
@@ -279,16 +269,13 @@ def test_a_base_is_freed_and_fixed(tmp_path):
             made = robots.load_file(file, free_flyer=floats, pose="home")
             assert made.model.nv == told.model.nv == (7 if floats else 1)
             np.testing.assert_allclose(made.q0, told.q0)
-            np.testing.assert_allclose(
-                made.model.jointPlacements[-1].homogeneous,
-                told.model.jointPlacements[-1].homogeneous,
-            )
+            places = (one.model.jointPlacements[-1].homogeneous for one in (made, told))
+            np.testing.assert_allclose(*places)
     turned = LIMB.format(free="", place="").replace('"0 0 0.5"', '"0 0 0.5" euler="0 1.5 0"')
     framed = turned.replace("<body", '<frame euler="0.5 0 0"><body', 1)
     free.write_text(framed.replace("</worldbody>", "</frame></worldbody>"))
-    as_drawn = robots.load_file(free, free_flyer=True).q0
-    np.testing.assert_allclose(robots.load_file(free, free_flyer=True, pose="home").q0[:7],
-                               as_drawn[:7])  # fmt: skip
+    drawn, home = (robots.load_file(free, free_flyer=True, pose=one).q0 for one in (None, "home"))
+    np.testing.assert_allclose(home[:7], drawn[:7])
     with pytest.raises(robots.RobotError, match="has a joint already: it cannot float"):
         robots.load_file(FOLDER / "hinge.xml", free_flyer=True)
     other = '<worldbody><body name="other"><joint name="b"/><geom size="1"/></body>'
@@ -305,19 +292,16 @@ def test_an_open_mesh_weighs_as_its_hull_and_nothing_where_nothing_moves(tmp_pat
     box = trimesh.creation.box((0.1, 0.2, 0.3))
     box.update_faces(np.arange(12) > 1)
     box.export(tmp_path / "open.stl")
-    text = """<mujoco><asset><mesh name="open" file="open.stl"/></asset><worldbody>
-      <body name="base"><geom type="mesh" mesh="open"/>
-        <body name="link"><joint name="turn" axis="0 1 0"/>{geom}
-        <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body></worldbody></mujoco>"""
-    (tmp_path / "a.xml").write_text(text.format(geom=""))
+    head = '<asset><mesh name="open" file="open.stl"/></asset>'
+    geom, joint = '<geom type="mesh" mesh="open"/>', '<joint name="turn" axis="0 1 0"/>'
+    text = f'<body name="base">{geom}<body name="link">{joint}{{}}</body></body>'
+    path = written(tmp_path, text.format(INERTIAL), head)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert robots.load_file(tmp_path / "a.xml").model.inertias[1].mass == 1.0
-    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-    geom = '<geom type="mesh" mesh="open"/>'
-    (tmp_path / "b.xml").write_text(text.format(geom=geom).replace(inertial, ""))
+        assert robots.load_file(path).model.inertias[1].mass == 1.0
+    path = written(tmp_path, text.format(geom), head)
     with pytest.warns(RobotWarning, match="not closed are those of their convex hulls: 'open'"):
-        model = robots.load_file(tmp_path / "b.xml").model
+        model = robots.load_file(path).model
     assert model.inertias[1].mass == pytest.approx(1000 * 0.1 * 0.2 * 0.3)
 
 
@@ -327,14 +311,12 @@ def test_meshes_of_mjcf(tmp_path):
     assert kinds.count("Sphere") == 1
     assert len(kinds) == 4
     text = (FOLDER / "meshes.xml").read_text()
-    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
-    text = text.replace('<geom type="mesh" mesh="w', f'{inertial}<geom type="mesh" mesh="w')
+    text = text.replace('<geom type="mesh" mesh="w', f'{INERTIAL}<geom type="mesh" mesh="w')
     text = text.replace('meshdir="assets"', f'meshdir="{FOLDER / "assets"}"')
     path = tmp_path / "r.xml"
+    (tmp_path / "broken.stl").write_text("solid")
     for name in ("nix.stl", "broken.stl"):
-        (tmp_path / "broken.stl").write_text("solid")
-        lost = text.replace('file="wedge.stl"', f'file="{tmp_path / name}"')
-        path.write_text(lost)
+        path.write_text(text.replace('file="wedge.stl"', f'file="{tmp_path / name}"'))
         said = rf"meshes, which are missing or broken: .*{name}; what lacks .*meshdir="
         with pytest.warns(RobotWarning, match=said):
             robot = robots.load_file(path)
@@ -342,12 +324,9 @@ def test_meshes_of_mjcf(tmp_path):
         assert 0 < len(robot.collision_model.geometryObjects) < 4
 
 
-SHOWN = text_of("robots/shown.xml").rstrip()
-
-
 def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
     """Neither are the files that it names: a device would have no end."""
-    (tmp_path / "r.xml").write_text(SHOWN)
+    (tmp_path / "r.xml").write_text(text_of("robots/shown.xml"))
     with pytest.warns(RobotWarning) as caught:
         robot = robots.load_file(tmp_path / "r.xml", pose="home")
     said = " ".join(str(one.message) for one in caught)
@@ -360,48 +339,14 @@ def test_what_only_shows_or_moves_the_robot_is_not_read(tmp_path):
     np.testing.assert_allclose(ball.meshColor, [0.1, 0.2, 0.3, 1], atol=1e-6)
 
 
-def test_models_that_are_attached_weigh_and_move_as_in_mujoco(tmp_path):
-    """Their defaults and units stay theirs, and those of two copies apart."""
-    (tmp_path / "link.xml").write_text(
-        '<mujoco model="link"><compiler angle="radian"/><default><geom density="500"/>'
-        '<default class="heavy"><geom density="4000"/></default></default><worldbody>'
-        '<body name="b" pos="0 0 .1" euler="0 0.3 0"><joint name="j" axis="0 1 0"/>'
-        '<geom type="capsule" fromto="0 0 0 0 0 .3" size=".02"/><body pos="0 0 .3">'
-        '<joint name="k" axis="1 0 0"/><geom class="heavy" size=".03"/></body></body>'
-        '<frame name="f" pos="1 0 0"><body><joint name="n"/><geom size=".1"/></body></frame>'
-        "</worldbody></mujoco>"
-    )
-    file = tmp_path / "two.xml"
-    file.write_text(
-        '<mujoco><default><default class="heavy"><geom density="9"/></default></default><asset>'
-        '<model file="link.xml"/></asset><worldbody><body name="c"><joint name="base" '
-        'type="slide"/><geom size=".1"/><attach model="link" prefix="l_"/><frame pos="0 .2 0">'
-        '<attach model="link" body="b" prefix="r_"/></frame><attach model="link" frame="f" '
-        'prefix="f_"/></body></worldbody></mujoco>'
-    )
-    mujoco = pytest.importorskip("mujoco")
-    theirs = mujoco.MjModel.from_xml_path(str(file))
-    data, mass = mujoco.MjData(theirs), np.zeros((theirs.nv, theirs.nv))
-    mujoco.mj_forward(theirs, data)
-    mujoco.mj_fullM(theirs, data, mass)
-    model = robots.load_file(file).model
-    at = [model.joints[model.getJointId(theirs.joint(k).name)].idx_v for k in range(theirs.njnt)]
-    assert np.allclose(mass_matrix(model, pin.neutral(model))[np.ix_(at, at)], mass, atol=1e-12)
-
-
 @pytest.mark.parametrize(
-    ("kind", "size", "half"),
-    [
-        ("sphere", (0.1,), (0.1, 0.1, 0.1)),
-        ("capsule", (0.1, 0.2), (0.1, 0.1, 0.3)),
-        ("cylinder", (0.1, 0.2), (0.1, 0.1, 0.2)),
-        ("ellipsoid", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
-        ("box", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
-    ],
+    ("kind", "half"),
+    [("sphere", (0.1, 0.1, 0.1)), ("capsule", (0.1, 0.1, 0.3)), ("cylinder", (0.1, 0.1, 0.2))]
+    + [(kind, (0.1, 0.2, 0.3)) for kind in ("ellipsoid", "box")],
 )
-def test_shapes_are_as_large_as_mujoco_says(tmp_path, kind, size, half):
+def test_shapes_are_as_large_as_mujoco_says(tmp_path, kind, half):
     """Its sizes are half lengths, of a capsule without its ends."""
-    geom = f'<geom type="{kind}" size="{" ".join(map(str, size))}"/>'
+    geom = f'<geom type="{kind}" size="0.1 0.2 0.3"/>'
     robot = robots.load_file(written(tmp_path, f'<body><joint name="j"/>{geom}</body>'))
     (one,) = robot.collision_model.geometryObjects
     one.geometry.computeLocalAABB()

@@ -12,7 +12,7 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import errors
 from sphshell_pin.scenario import build, run_built, run_scenario
-from sphshell_pin.scenario.running.figures import figure_names, measuring
+from sphshell_pin.scenario.running.figures import figure_units, measuring
 from tests.programs import python
 from tests.scenario.files import DROP, write
 from tests.scenario.operations import visible
@@ -155,7 +155,7 @@ def test_an_unknown_figure_is_told_before_the_run(tmp_path):
 
 def test_every_figure_can_be_measured(built):
     result = built.simulation.run(built.q0, built.v0, 0.01)
-    names, measure = figure_names(built), measuring(built, result)
+    names, measure = figure_units(built), measuring(built, result)
     assert "final.v.root_joint.5" in names
     for name in names:
         assert isinstance(measure(name), float)

@@ -11,12 +11,12 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.contents import Finding, Table, columns
+from sphshell_pin.study.report.contents import Table, columns
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.swing import GRAVITY
 from tests.rolling import Ball, turned
 from tests.validation.balls import plane
-from tests.validation.cases import Outcome, case, read
+from tests.validation.cases import Outcome, case, read, within
 from tests.validation.pictures import Panel
 
 BOX, SIDES, FORCE = 10.0, np.array([20.0, 20.0, 1.0]), 150.0  # [kg], [m], [N]
@@ -90,11 +90,11 @@ def carried_balls() -> Outcome:
     theirs = {name: data[name] for name in ("along y", "diagonal")}
     what = "four directions, acceleration relative to"
     findings = [
-        Finding("box", f"box, {what} {EXACT[0]:.4f} m/s²", box, aim=1e-4),
-        Finding("ball", f"ball, {what} {EXACT[1]:.3f} m/s²", ball, aim=1e-4),
-        Finding("aside", "speed across the force, over that along it", aside, aim=1e-5),
-        Finding("y", "SimBenchmark's error, along y", errors[0], "m²/s²", aim=1e-5),
-        Finding("diagonal", "SimBenchmark's error, diagonal", errors[1], "m²/s²", aim=1e-5),
+        *within(1e-4, (f"box, {what} {EXACT[0]:.4f} m/s²", box)),
+        *within(1e-4, (f"ball, {what} {EXACT[1]:.3f} m/s²", ball)),
+        *within(1e-5, ("speed across the force, over that along it", aside)),
+        *within(1e-5, ("SimBenchmark's error, along y", errors[0]), unit="m²/s²"),
+        *within(1e-5, ("SimBenchmark's error, diagonal", errors[1]), unit="m²/s²"),
     ]
     rows = [("ours", *errors), *zip(data.texts("engine"), *theirs.values(), strict=True)]
     what = "SimBenchmark's error of velocities [m²/s²]."

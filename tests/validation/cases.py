@@ -12,9 +12,9 @@ from __future__ import annotations
 import csv
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,12 +23,11 @@ from sphshell_pin.base.regular_file import read_text
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.study.report.contents import Finding, Table
 from tests.register import Register
-from tests.validation.pictures import Panel
+from tests.validation.pictures import Panel, Series
 
 MODULES = (
     "kharaz",
-    "chung_ooi_normal",
-    "chung_ooi_spin",
+    "chung_ooi",
     "pressed",
     "ellipses",
     "finger_pad",
@@ -42,6 +41,7 @@ MODULES = (
     "tosses",
 )
 """In the order of the page."""
+Sense = Literal["<=", ">="]
 DATA = Path(__file__).parents[1] / "data" / "validation"
 STATED: dict[str, Any] = tomllib.loads(
     Path(__file__).with_name("cases.toml").read_text(encoding="utf-8")
@@ -53,23 +53,34 @@ WHY: dict[str, str] = STATED.pop("explanations")
 
 
 @dataclass(frozen=True)
+class Figure(Finding):
+    """A finding with its bound; `why`: the physics left out, where it may be out of its bound."""
+
+    why: str = ""
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """What a case found: `findings` with bounds, the first of which stands for the case.
+    """What a case found: figures, the first of which stands for the case, and the picture."""
 
-    `explained` names, by the key of a finding that is out of its bound, the physics that the theory
-    leaves out.
-    """
-
-    findings: Sequence[Finding]
+    findings: Sequence[Figure]
     panels: Sequence[Panel]
     tables: Sequence[Table] = ()
     notes: Sequence[str] = ()
-    explained: Mapping[str, str] = field(default_factory=dict)
 
     @property
-    def unexplained(self) -> list[Finding]:
-        """The findings that are out of their bounds without an explanation."""
-        return [f for f in self.findings if f.met is False and f.key not in self.explained]
+    def unexplained(self) -> list[Figure]:
+        """The figures that are out of their bounds without an explanation."""
+        return [f for f in self.findings if f.met is False and not f.why]
+
+    @property
+    def explanations(self) -> list[str]:
+        """Why figures are out of their bounds, a text for those that have the same reason."""
+        reasons: dict[str, list[str]] = {}
+        for one in self.findings:
+            if one.met is False and one.why:
+                reasons.setdefault(one.why, []).append(one.what)
+        return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,18 +120,14 @@ class Case:
         }
 
 
-def within(aim: float, *errors: tuple[str, str, float], unit: str = "") -> list[Finding]:
-    """Return findings of errors (key, what, error), of which only the size counts."""
-    return [Finding(key, what, abs(float(error)), unit, aim=aim) for key, what, error in errors]
-
-
-def explanations(found: Outcome) -> list[str]:
-    """Return why findings are out of their bounds, a text for those that have the same reason."""
-    reasons: dict[str, list[str]] = {}
-    for finding in found.findings:
-        if finding.met is False and finding.key in found.explained:
-            reasons.setdefault(found.explained[finding.key], []).append(finding.what)
-    return [f"Out of bounds: {'; '.join(names)}. {text}" for text, names in reasons.items()]
+def within(
+    aim: float, *errors: tuple[str, float], unit: str = "", why: str = "", sense: Sense = "<="
+) -> list[Figure]:
+    """Return figures of errors (what, error), of which only the size counts."""
+    return [
+        Figure("", what, abs(float(error)), unit, aim=aim, sense=sense, why=why)
+        for what, error in errors
+    ]
 
 
 # What a case states of itself is in cases.toml.
@@ -156,6 +163,11 @@ class Data:
         chosen = [k for k, text in enumerate(self.texts(column)) if text == value]
         rows = {name: [cells[k] for k in chosen] for name, cells in self.columns.items()}
         return Data(self.name, self.origin, rows)
+
+    def series(self, column: str, x: str, label: str = "{}") -> list[Series]:
+        """Return `x` and the values of the rows of each of the texts in a column."""
+        each = {text: self.where(column, text) for text in dict.fromkeys(self.texts(column))}
+        return [(label.format(text), one[x], one["value"]) for text, one in each.items()]
 
 
 def read(name: str) -> Data:

@@ -31,49 +31,30 @@ def finger_pad() -> Outcome:
         name: [press(RADIUS, plate, law, approach) for approach in approaches]
         for name, law in laws.items()
     }
-    findings = []
+    findings, measured = [], published["displacement_exponent"]
     for name, found in touches.items():
         last = found[-1]
         ratio = last.pressure * np.pi * last.a * last.b / last.force
         shape = f"{name}: largest over mean pressure, relative to that of a paraboloid"
         power = f"{name}: exponent of displacement over force, relative to the measured 2/3"
-        measured = published["displacement_exponent"]
-        findings += within(
-            BOUND,
-            (f"{name}_shape", shape, ratio / published["peak_over_mean"] - 1),
-            (f"{name}_exponent", power, exponent(found) / measured - 1),
-        )
+        errors = ratio / published["peak_over_mean"] - 1, exponent(found) / measured - 1
+        hertz = name == "HertzLaw"
+        findings += within(BOUND, (shape, errors[0]), why=WHY["bone"] if hertz else "")
+        findings += within(BOUND, (power, errors[1]), why="" if hertz else WHY["layer"])
     x = np.linspace(-1, 1, 201)
     # The definition of FoundationLaw on a plane, at the largest approach.
     height = RADIUS - approaches[-1]
     from_center = np.hypot(height, x * np.sqrt(RADIUS**2 - height**2))
     pressure = (RADIUS**2 / from_center - from_center) / (RADIUS**2 / height - height)
-    panels = [
-        Panel(
-            "place / half width of the contact",
-            "pressure / largest",
-            (),
-            [("FoundationLaw", x, pressure), ("HertzLaw", x, np.sqrt(1 - x**2))],
-            [("paraboloid, as measured", x, 1 - x**2)],
-        ),
-        Panel(
-            "force / largest",
-            "displacement / largest",
-            (),
-            [
-                (
-                    name,
-                    [one.force / found[-1].force for one in found],
-                    [one.approach / found[-1].approach for one in found],
-                )
-                for name, found in touches.items()
-            ],
-            [("power of 2/3, as measured", line := np.geomspace(1e-3, 1, 9), line**measured)],
-            logarithmic=True,
-        ),
-    ]
-    return Outcome(
-        findings,
-        panels,
-        explained={"FoundationLaw_exponent": WHY["layer"], "HertzLaw_shape": WHY["bone"]},
-    )
+    ours = [("FoundationLaw", x, pressure), ("HertzLaw", x, np.sqrt(1 - x**2))]
+    bulge = [("paraboloid, as measured", x, 1 - x**2)]
+    axes = "place / half width of the contact", "pressure / largest"
+    pressures = Panel(*axes, (), ours, bulge)
+    grown = []
+    for name, found in touches.items():
+        columns = np.array([(one.force, one.approach) for one in found])
+        grown.append((name, *(columns / columns[-1]).T))
+    line = np.geomspace(1e-3, 1, 9)
+    power_law = [("power of 2/3, as measured", line, line**measured)]
+    axes = "force / largest", "displacement / largest"
+    return Outcome(findings, [pressures, Panel(*axes, (), grown, power_law, logarithmic=True)])

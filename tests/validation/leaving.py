@@ -76,9 +76,9 @@ def ball_leaves_ball() -> Outcome:
     off = "error of the angle, relative"
     findings = within(
         1e-4,
-        ("rolls", f"sticks, acos(10/17), {off}", left[STICKS] / math.acos(10 / 17) - 1),
-        ("slides", f"frictionless, acos(2/3), {off}", left[0.0] / math.acos(2 / 3) - 1),
-        ("slips", f"six coefficients, closed form, {off}", max(errors)),
+        (f"sticks, acos(10/17), {off}", left[STICKS] / math.acos(10 / 17) - 1),
+        (f"frictionless, acos(2/3), {off}", left[0.0] / math.acos(2 / 3) - 1),
+        (f"six coefficients, closed form, {off}", max(errors)),
     )
     fine = np.linspace(0.0, 3.5, 141)
     shown = [mu for mu in COEFFICIENTS if mu <= fine[-1]]

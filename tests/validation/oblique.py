@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,7 @@ import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.friction import Friction
 from tests.oracle import oblique as oracle
-from tests.validation.balls import Ball, Impact, head_on, on_plane
+from tests.validation.balls import Ball, head_on, on_plane
 
 MOBILITY = 1 + 1 / oracle.SOLID  # of the contact patch of a solid ball, times its mass
 RIGID = 1e20  # Young's modulus [Pa] of what the benchmarks call rigid
@@ -61,55 +60,36 @@ class Setting:
         law = sp.HertzLaw(*self.materials, *damping)
         return law, sp.MindlinFriction(self.mu, self.mu, *self.materials, rings=self.rings)
 
-    def impact(self, normal: float, tangential: float, spin: float = 0.0) -> Rebound:
+    def impact(self, normal: float, tangential: float, spin: float = 0.0) -> Array:
         """Shoot the ball down at `normal` and along x at `tangential` speed [m/s].
 
-        `spin` [rad/s] is about y, positive where the ball rolls on along x.
+        `spin` [rad/s] is about y, positive where the ball rolls on along x. Return what it has
+        after it: normal and tangential velocity [m/s], spin, velocity of the contact patch.
         """
-        law, friction = self.laws(normal)
         ball = Ball(self.radius, self.density, (tangential, 0.0, -normal), (0.0, spin, 0.0))
         if self.radius_2 is None:
-            seen = on_plane(ball, law, friction)
+            seen = on_plane(ball, *self.laws(normal))
         else:
-            seen = head_on(ball, Ball(self.radius_2, self.density_2), law, friction)
-        return Rebound.of(self.radius, seen)
+            seen = head_on(ball, Ball(self.radius_2, self.density_2), *self.laws(normal))
+        (x, _, z), (_, after, _) = seen.velocities[0], seen.spins[0]
+        return np.array([z, x, after, x - self.radius * after])
 
 
-@dataclass(frozen=True)
-class Rebound:
-    """A ball after an impact: velocity of its center [m/s], spin [rad/s], of its contact patch."""
+def thrown(setting: Setting, speed: float, angles: ArrayLike) -> dict[str, Array]:
+    """Throw the ball at `speed` [m/s], at each of the angles (n,) from the normal [degrees].
 
-    normal: float
-    tangential: float
-    spin: float
-    patch: float
-
-    @classmethod
-    def of(cls, radius: float, impact: Impact) -> Rebound:
-        """Return that of the first ball."""
-        (x, _, z), (_, spin, _) = impact.velocities[0], impact.spins[0]
-        return cls(float(z), float(x), float(spin), float(x - radius * spin))
-
-    @property
-    def rebound_angle(self) -> float:
-        """Angle of the center's velocity from the normal [degrees]."""
-        return math.degrees(math.atan2(self.tangential, self.normal))
-
-    @property
-    def patch_angle(self) -> float:
-        """Angle of the contact patch's velocity from the normal [degrees]."""
-        return math.degrees(math.atan2(self.patch, self.normal))
-
-
-def thrown(setting: Setting, speed: float, angles: ArrayLike) -> list[Rebound]:
-    """Throw the ball at `speed` [m/s], at each of the angles from the normal [degrees]."""
+    Return by name, each (n,): the restitution along the plane, the spin, and the angles of the
+    velocities of the center and of the contact patch from the normal [degrees].
+    """
     radians = np.radians(np.asarray(angles, dtype=float))
-    return [setting.impact(speed * math.cos(a), speed * math.sin(a)) for a in radians]
-
-
-def of(rebounds: Iterable[Rebound], quantity: str) -> Array:
-    """Return one quantity of rebounds (n,)."""
-    return np.array([getattr(one, quantity) for one in rebounds])
+    found = [setting.impact(speed * math.cos(a), speed * math.sin(a)) for a in radians]
+    normal, tangential, spin, patch = np.array(found).T
+    return {
+        "restitution": tangential / (speed * np.sin(radians)),
+        "spin": spin,
+        "rebound_angle": np.degrees(np.arctan2(tangential, normal)),
+        "patch_angle": np.degrees(np.arctan2(patch, normal)),
+    }
 
 
 def rms(errors: Array) -> float:

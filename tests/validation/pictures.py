@@ -1,4 +1,4 @@
-"""What the pictures of the cases share: published points, our lines over them."""
+"""The pictures of the cases: published points, our lines over them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,11 +6,22 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sphshell_pin.plot.figure import png as png_of
-from tests.validation import drawing
+from sphshell_pin.plot.figure import new_figure, png
 
-COLORS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.VIOLET, drawing.RED)
-MARKS = ("o", "s", "^", "D", "v")
+INK, FAINT, RULE = "#1c2024", "#656d77", "#e2e3df"
+COLORS, MARKS = ("#2160b8", "#c26a00", "#14804a", "#7340b0", "#b8262f"), ("o", "s", "^", "D", "v")
+STYLE: dict[str, object] = {
+    "font.size": 9.0,
+    "axes.edgecolor": FAINT,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": True,
+    "grid.color": RULE,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "lines.linewidth": 1.6,
+}
 Series = tuple[str, ArrayLike, ArrayLike]
 """A name, x (n,) and y (n,)."""
 
@@ -35,27 +46,25 @@ def draw(panels: Sequence[Panel]) -> bytes:
     """Return the panels side by side as a PNG file."""
     wide = 2 if len(panels) == 4 else len(panels)
     tall = len(panels) // wide
-    with drawing.canvas(max(4.6, 3.9 * wide), 3.3 * tall) as figure:
+    figure = new_figure(max(4.6, 3.9 * wide), 3.3 * tall)
+    from matplotlib import rc_context
+
+    dashed = {"color": INK, "linewidth": 1.0, "linestyle": (0, (4, 3))}
+    marked = {"color": INK, "linestyle": "", "markerfacecolor": "none", "markersize": 4.5}
+    with rc_context(STYLE):  # type: ignore[arg-type]
         axes = figure.subplots(tall, wide, squeeze=False).flat
         for axis, panel in zip(axes, panels, strict=True):
             for k, (label, x, y) in enumerate(panel.ours):
                 axis.plot(x, y, color=COLORS[k % len(COLORS)], label=label)
             for label, x, y in panel.theory:
-                axis.plot(
-                    x, y, color=drawing.INK, linewidth=1.0, linestyle=(0, (4, 3)), label=label
-                )
+                axis.plot(x, y, label=label, **dashed)
             for k, (label, x, y) in enumerate(panel.published):
-                axis.plot(
-                    np.asarray(x), np.asarray(y), MARKS[k % len(MARKS)], label=label,
-                    color=drawing.INK, markerfacecolor="none", markersize=4.5,
-                )  # fmt: skip
+                marker = MARKS[k % len(MARKS)]
+                axis.plot(np.asarray(x), np.asarray(y), marker=marker, label=label, **marked)
             if panel.logarithmic:
-                axis.set_xscale("log")
-                axis.set_yscale("log")
+                axis.set(xscale="log", yscale="log")
             if panel.equal:
                 axis.set_aspect("equal", "datalim")
-            axis.set_xlabel(panel.x)
-            axis.set_ylabel(panel.y)
-            axis.grid(visible=True)
-            axis.legend(fontsize=drawing.SMALL - 0.5, edgecolor="none", framealpha=0.85)
-        return png_of(figure, 160)
+            axis.set(xlabel=panel.x, ylabel=panel.y)
+            axis.legend(fontsize=7.5, edgecolor="none", framealpha=0.85)
+        return png(figure, 160)

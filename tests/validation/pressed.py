@@ -4,9 +4,8 @@ import numpy as np
 import pinocchio as pin
 
 import sphshell_pin as sp
-from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of
-from tests.validation.cases import Outcome, case, read
+from tests.validation.cases import Outcome, case, read, within
 from tests.validation.pictures import Panel
 
 RADIUS, YOUNG, POISSON = 0.05, 2e10, 0.3
@@ -29,22 +28,21 @@ def two_balls() -> Outcome:
         patch = instant.run(start, duration=1e-9, record=("patch",)).patches[0]
         return float(patch["peak_pressure"]), float(patch["half_axes"][0])
 
-    peak, radius = pressed(4e-3)
-    there = {name: float(data[name][0]) for name in ("pressure", "radius")}
-    apart = abs(peak / there["pressure"] - 1), abs(radius / there["radius"] - 1)
-    findings = [
-        Finding("pressure", "peak pressure, relative", apart[0], aim=1e-4),
-        Finding("radius", "radius of the contact, relative", apart[1], aim=1e-4),
-    ]
-    approaches = np.linspace(1e-5, 5e-3, 60)
-    ours = np.array([pressed(one) for one in approaches])
-    curves = (
-        ("peak pressure [MPa]", 1e-6 * there["pressure"], 1e-6 * ours[:, 0]),
-        ("radius of the contact [mm]", 1e3 * there["radius"], 1e3 * ours[:, 1]),
+    there = [float(data[name][0]) for name in ("pressure", "radius")]
+    apart = np.array(pressed(4e-3)) / there - 1
+    findings = within(
+        1e-4,
+        ("peak pressure, relative", apart[0]),
+        ("radius of the contact, relative", apart[1]),
     )
-    x = 1e3 * approaches
+    approaches = np.linspace(1e-5, 5e-3, 60)
+    ours = np.array([pressed(one) for one in approaches]).T
     panels = [
-        Panel("approach [mm]", label, [("Code_Aster", [4.0], [value])], [("ours", x, line)])
-        for label, value, line in curves
-    ]
+        Panel("approach [mm]", label, [("Code_Aster", [4.0], [unit * value])],
+              [("ours", 1e3 * approaches, unit * line)])
+        for label, unit, value, line in zip(
+            ("peak pressure [MPa]", "radius of the contact [mm]"), (1e-6, 1e3), there, ours,
+            strict=True,
+        )
+    ]  # fmt: skip
     return Outcome(findings, panels)

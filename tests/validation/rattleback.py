@@ -13,9 +13,9 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of
-from tests.validation.cases import Outcome, case
+from tests import meshes
+from tests.validation.cases import Outcome, case, within
 from tests.validation.pictures import Panel
 
 AXES = np.array([0.2, 0.03, 0.02])  # [m]
@@ -37,9 +37,8 @@ def roll(spin: float, duration: float) -> tuple[Array, Array, Array]:
         turn = np.cross(n, w)
         r = -squares @ n / reach - MIDDLE
         moves = -squares @ turn / reach + squares @ n * (n @ squares @ turn) / reach**3
-        rest = (
-            np.cross(w, np.cross(r, w)) - np.cross(w, moves) + GRAVITY * n
-        )  # force / mass less w'
+        # Force over mass, less what comes from w'.
+        rest = np.cross(w, np.cross(r, w)) - np.cross(w, moves) + GRAVITY * n
         arm = pin.skew(r)
         moment = -np.cross(w, INERTIA @ w) + MASS * np.cross(r, rest)
         return np.concatenate((turn, np.linalg.solve(INERTIA - MASS * arm @ arm, moment)))
@@ -65,19 +64,17 @@ def ellipsoid(cells: int, axes: Array) -> tuple[Array, Array, Array]:
     """
     angle = np.tan(np.linspace(-math.pi / 4, math.pi / 4, cells + 1))
     u, v = np.meshgrid(angle, angle, indexing="ij")
-    number = np.arange(u.size).reshape(u.shape)
-    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
-    quads = np.stack(corners, -1).reshape(-1, 4)
-    sides, points = [], []
-    for k in range(6):
-        sign = 1.0 - 2.0 * (k % 2)
-        points.append(np.roll(np.dstack([sign * np.ones_like(u), sign * u, v]), k // 2, axis=2))
-        sides.append(quads + k * u.size)
+    quads = meshes.grid_plate(cells, cells, quads=True)[1]
+    points = [
+        np.roll(np.dstack([sign * np.ones_like(u), sign * u, v]), k, axis=2)
+        for k in range(3)
+        for sign in (1.0, -1.0)
+    ]
     every = np.concatenate(points).reshape(-1, 3)
     every /= np.linalg.norm(every, axis=1)[:, None]
     normals = every / axes
     normals /= np.linalg.norm(normals, axis=1)[:, None]
-    return every * axes, np.concatenate(sides), normals
+    return every * axes, np.concatenate([quads + k * u.size for k in range(6)]), normals
 
 
 def spin_on_plane(spin: float, duration: float) -> tuple[Array, Array, float]:
@@ -119,11 +116,11 @@ def rattleback() -> Outcome:
         ours = spin_on_plane(start, duration)
         error = abs(last_zero(*ours[:2]) - zeros[-1])
         what = f"when the spin of {start:+g} rad/s is zero for the last time, {zeros[-1]:.4g} s"
-        findings.append(Finding(f"zero_{start:+g}", what, error, "s", aim=0.03))
+        findings += within(0.03, (what, error), unit="s")
         lines = [("sp.Plane", *ours[:2])]
         theory = [("rigid rolling", t, rigid)]
         panels.append(Panel("time [s]", "spin [rad/s]", (), lines, theory))
         lost = ours[2] / (0.5 * INERTIA[2, 2] * start**2)
         what = f"energy lost from {start:+g} rad/s, of that of the spin"
-        findings.append(Finding(f"lost_{start:+g}", what, lost, aim=0.02))
+        findings += within(0.02, (what, lost))
     return Outcome(findings, panels)

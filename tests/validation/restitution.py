@@ -13,10 +13,9 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.contact.normal_law import bisect
-from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of
 from tests.validation.balls import plane
-from tests.validation.cases import Outcome, case, read
+from tests.validation.cases import Outcome, case, read, within
 from tests.validation.pictures import Panel
 
 RADIUS, GAP = 0.1, 1e-4  # [m]
@@ -66,8 +65,8 @@ def hunt_crossley() -> Outcome:
     )
     off, apart = np.abs(seen / exact - 1).max(), np.abs(theirs / seen[0] - 1).max()
     findings = [
-        Finding("form", "four bodies, error relative to the closed form", off, aim=1e-6),
-        Finding("exudyn", "EXUDYN's sphere, relative to EXUDYN's figures", apart, aim=5e-4),
+        *within(1e-6, ("four bodies, error relative to the closed form", off)),
+        *within(5e-4, ("EXUDYN's sphere, relative to EXUDYN's figures", apart)),
     ]
     published = [("EXUDYN, first of three impacts", c[::3], theirs[::3])]
     published += [("asked of EXUDYN", c[::3], data["asked"][::3])]

@@ -13,11 +13,10 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.friction import Friction
-from sphshell_pin.study.report.contents import Finding
 from sphshell_pin.study.report.models import model_of
 from tests.rolling import UP, turned
 from tests.validation.balls import plane
-from tests.validation.cases import Outcome, case
+from tests.validation.cases import Outcome, case, within
 from tests.validation.pictures import Panel
 
 MASS, RADIUS, OFF, GRAVITY = 0.02, 0.02, 0.006, 9.82  # kg, m, m, m/s^2
@@ -62,9 +61,9 @@ def tippe_top() -> Outcome:
     tilted = 180 - min(math.degrees(tilt[-1]) for _, tilt, _, _ in over)
     wrong = max(abs(spin * AXIAL * (RADIUS + OFF) / j[0] - 1) for _, _, j, spin in over)
     findings = [
-        Finding("jellett", "J, three frictions, largest relative change", most, aim=1e-4),
-        Finding("turned", "tilt at the end where it slips, short of 180", tilted, "deg", aim=3.0),
-        Finding("spin", "spin turned over, relative to J / (C (R + e))", wrong, aim=1e-3),
+        *within(1e-4, ("J, three frictions, largest relative change", most)),
+        *within(3.0, ("tilt at the end where it slips, short of 180", tilted), unit="deg"),
+        *within(1e-3, ("spin turned over, relative to J / (C (R + e))", wrong)),
     ]
     drifts = [(name, runs[name][0], 1e5 * change) for name, change in changes.items()]
     panels = [

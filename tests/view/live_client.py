@@ -27,12 +27,13 @@ def inside(url, name, scheme="http"):
 
 
 def get(url, **headers):
-    """Return status and body of a page."""
+    """Return status, body and headers of a page."""
     try:
-        with urllib.request.urlopen(urllib.request.Request(url, headers=headers)) as answer:
-            return answer.status, answer.read(), dict(answer.headers)
+        answer = urllib.request.urlopen(urllib.request.Request(url, headers=headers))
     except urllib.error.HTTPError as refused:
-        return refused.code, refused.read(), dict(refused.headers)
+        answer = refused
+    with answer:
+        return answer.status, answer.read(), dict(answer.headers)
 
 
 class Client:
@@ -41,8 +42,8 @@ class Client:
     def __init__(self, url, answers=True):
         self.address = inside(url, "socket", "ws")
         self.answers = answers
-        self.hello, self.state, self.closed = None, None, False
-        self.errors, self.rows, self.scenes, self.ends = [], [], [], 0
+        self.hello, self.state, self.end, self.closed = None, None, None, False
+        self.errors, self.scenes = [], []
 
     async def open(self, **headers):
         request = HTTPRequest(self.address, headers=headers)
@@ -70,15 +71,10 @@ class Client:
                     await self.say("seen", frame=len(self.scenes))
         else:
             data = json.loads(message)
-            kind = data["type"]
-            if kind == "rows":
-                self.rows += data["rows"]
-            elif kind == "error":
+            if data["type"] == "error":
                 self.errors.append(data["text"])
-            elif kind == "end":
-                self.ends += 1
             else:
-                setattr(self, kind, data)
+                setattr(self, data["type"], data)
 
     async def until(self, condition):
         """Read until condition(self) holds, or the connection is closed."""

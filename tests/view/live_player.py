@@ -12,7 +12,6 @@ from tests import models
 from tests.view.stand_ins import contact_pair, plate
 
 RADIUS, MASS, GRAVITY = 0.05, 1.0, 9.81
-ROW_DT = 1e-3
 
 
 class BallPlayer:
@@ -42,12 +41,11 @@ class BallPlayer:
 
     @property
     def parameters(self):
-        return tuple(
-            SimpleNamespace(
-                key=key, label=key, unit="", low=value / 10, high=value * 10, log=True, value=value
-            )
-            for key, value in self.knob_values.items()
-        )
+        def slider(key, value):
+            about = {"label": key, "unit": "", "low": value / 10, "high": value * 10, "log": True}
+            return SimpleNamespace(key=key, value=value, **about)
+
+        return tuple(slider(*one) for one in self.knob_values.items())
 
     bodies = ("ball",)
 

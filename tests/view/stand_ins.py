@@ -40,20 +40,10 @@ def ball_configuration(position, angle=0.0):
 
 def contact_log(rows):
     """A contact log of dictionaries; what they leave out is filled in."""
-    defaults = {
-        "row": 0,
-        "pair": 0,
-        "t": 0.0,
-        "point_world": np.zeros(3),
-        "normal_world": np.array([0.0, 0.0, 1.0]),
-        "depth": 1e-4,
-        "normal_force": 1.0,
-        "friction_force_world": np.zeros(3),
-        "slip_velocity_world": np.zeros(3),
-        "element": 0,
-        "feature": 0,
-        "contact_id": 0,
-    }
+    zero, up = np.zeros(3), np.array([0.0, 0.0, 1.0])
+    defaults = dict.fromkeys(("row", "pair", "element", "feature", "contact_id"), 0)
+    defaults |= {"t": 0.0, "point_world": zero, "normal_world": up, "depth": 1e-4}
+    defaults |= {"normal_force": 1.0, "friction_force_world": zero, "slip_velocity_world": zero}
     # One row more gives every column its shape and kind.
     filled = [{**defaults, **row} for row in (*rows, {})]
     return ContactLog(**{key: np.array([row[key] for row in filled])[:-1] for key in defaults})
@@ -63,19 +53,10 @@ def a_result(t, q, rows=(), pairs=("tip",), **energy):
     """A result at times `t` (n,) and configurations `q` (n, nq) with the contacts `rows`."""
     t = np.asarray(t, dtype=float)
     names = ("kinetic", "potential", "elastic", "damping_loss", "friction_loss", "control_work")
-    audit = {name: np.zeros(len(t)) for name in (*names, "residual")}
-    return SimpleNamespace(
-        t=t,
-        q=np.asarray(q, dtype=float),
-        pairs=list(pairs),
-        contacts=contact_log(rows),
-        energy=SimpleNamespace(**{**audit, "exchanged": 1.0, **energy}),
-        stats=RunStats(),
-        scene=None,
-        origin=None,
-        patch_rows=None,
-        sensors={},
-    )
+    audit = {name: np.zeros(len(t)) for name in (*names, "residual")} | {"exchanged": 1.0}
+    made = {"t": t, "q": np.asarray(q, dtype=float), "pairs": list(pairs), "stats": RunStats()}
+    made |= {"contacts": contact_log(rows), "energy": SimpleNamespace(**audit | energy)}
+    return SimpleNamespace(**made, scene=None, origin=None, patch_rows=None, sensors={})
 
 
 def a_scene(model, *pairs):
@@ -90,18 +71,9 @@ def ball_on_plate(frames=61, dt=0.05):
     t = dt * np.arange(frames)
     configurations, rows = [], []
     for row, share in enumerate(np.linspace(0.0, 1.0, frames)):
-        touching = 0.25 <= share <= 0.75
-        height = 0.05 if touching else 0.05 + 0.6 * (abs(share - 0.5) - 0.25)
-        position = np.array([-0.3 + 0.6 * share, 0.1, height])
-        configurations.append(ball_configuration(position))
-        if touching:
-            rows.append(
-                {
-                    "row": row,
-                    "t": t[row],
-                    "point_world": position * [1, 1, 0],
-                    "normal_force": 5.0 + np.sin(20.0 * share),
-                    "friction_force_world": np.array([-1.5, 0.0, 0.0]),
-                }
-            )
+        x, height = -0.3 + 0.6 * share, 0.05 + 0.6 * max(abs(share - 0.5) - 0.25, 0.0)
+        configurations.append(ball_configuration([x, 0.1, height]))
+        if 0.25 <= share <= 0.75:
+            force = {"normal_force": 5.0 + np.sin(20.0 * share), "point_world": [x, 0.1, 0.0]}
+            rows.append({"row": row, "t": t[row], "friction_force_world": [-1.5, 0, 0], **force})
     return scene, a_result(t, configurations, rows, ("ball",))

@@ -39,10 +39,9 @@ def test_an_arrow_goes_from_the_contact_along_the_force():
     for name, force in (("normal", np.array([2.4, 0.0, 3.2])), ("friction", np.array([0, 1.0, 0]))):
         shaft, head = where[f"{name}_0/shaft"], where[f"{name}_0/head"]
         # three.js's unit cylinder lies along y from -1/2 to 1/2.
+        end = start + force * scale.meters_per_newton
         np.testing.assert_allclose((shaft @ [0, -0.5, 0, 1])[:3], start, atol=1e-12)
-        np.testing.assert_allclose(
-            (head @ [0, 0.5, 0, 1])[:3], start + force * scale.meters_per_newton, atol=1e-12
-        )
+        np.testing.assert_allclose((head @ [0, 0.5, 0, 1])[:3], end, atol=1e-12)
         np.testing.assert_allclose(shaft @ [0, 0.5, 0, 1], head @ [0, -0.5, 0, 1], atol=1e-12)
     np.testing.assert_allclose(where["point_0"][:3, 3], start)
 
@@ -96,14 +95,9 @@ def test_saddles_are_no_arrows_that_pull_and_the_sum_of_forces_stays(least):
     normal = np.array([3.0, 3.0, 3.0, -3.0 * least, -3.0 * least, 5.0])
     places = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0], [1, 0, 0], [3, 0, 0.0], [1, 0, 0]])
     normals = np.array([[np.sin(a), 0, np.cos(a)] for a in (0.2, 0, -0.2, 0.1, -0.1, 0)])
-    contacts = SimpleNamespace(
-        point_world=places,
-        normal_world=normals,
-        normal_force=normal,
-        friction_force_world=np.zeros((6, 3)),
-        pair=np.array([0, 0, 0, 0, 0, 1]),
-    )
-    drawn = pushing(contacts)
+    contacts = {"point_world": places, "normal_world": normals, "normal_force": normal}
+    contacts |= {"friction_force_world": np.zeros((6, 3)), "pair": np.array([0, 0, 0, 0, 0, 1])}
+    drawn = pushing(SimpleNamespace(**contacts))
     np.testing.assert_array_equal(drawn.point, places[[0, 1, 2, 5]])
     assert (np.sum(drawn.normal * normals[[0, 1, 2, 5]], axis=1) > 0.0).all()
     np.testing.assert_allclose(drawn.normal.sum(axis=0), normal @ normals, atol=1e-12)

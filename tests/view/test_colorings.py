@@ -2,7 +2,6 @@
 
 import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -14,12 +13,8 @@ from tests import models
 from tests.view.drawn import Film, attribute
 
 
-def scene_of(*shells, method="smooth"):
-    scene = sp.Scene(models.ball(joint=pin.JointModelTranslation()))
-    law = sp.ImpactLaw(1e6, 1.5, 0.0, 1e-3)
-    for shell in shells:
-        scene.add_contact(sp.Sphere(0.1, frame="ball"), shell, law=law, method=method)
-    return scene
+def scene_of(shell, method="smooth"):
+    return models.on_shell(models.block(), shell, models.linear_law(1e6), method=method)
 
 
 class Sheet(Film):
@@ -28,11 +23,6 @@ class Sheet(Film):
     def __init__(self, scene):
         super().__init__()
         self.display = Display(scene, visualizer=self.canvas)
-
-    def drawn(self, name):
-        """Positions (n, 3) and colours (n, 3) of the objects called `name`."""
-        found = [drawn for path, drawn in self.objects.items() if path.endswith("/" + name)]
-        return [(attribute(drawn), attribute(drawn, "color")) for drawn in found]
 
     def shown(self):
         """Which way to color the shell is seen."""
@@ -46,7 +36,8 @@ def test_each_kind_has_its_color(method):
     assert sheet.shown() == []
     sheet.display.show("faces", True)
     assert sheet.shown() == ["faces"]
-    ((points, colors),) = sheet.drawn("faces")
+    (drawn,) = (drawn for path, drawn in sheet.objects.items() if path.endswith("/faces"))
+    points, colors = attribute(drawn), attribute(drawn, "color")
     flat = np.isclose(np.abs(points[:, 2]), 0.15)
     kinds = dict(zip(FACE_COLORS, hex_colors(tuple(FACE_COLORS.values())), strict=True))
     is_plane = np.isclose(colors, kinds["plane"], atol=1e-6).all(axis=1)
@@ -63,9 +54,7 @@ def test_each_kind_has_its_color(method):
 def test_a_recording_states_the_kinds():
     shell = sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3))
     scene = scene_of(shell)
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        [0.0, 0.0, 0.3], np.zeros(3), 0.01
-    )
+    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run([0.0, 0.0, 0.3], duration=0.01)
     for color in ("surface", "faces"):
         page = render_recording(result, scene, color=color)
         assert ("on no face recognized" in page) == (color == "faces")

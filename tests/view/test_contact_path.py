@@ -14,13 +14,8 @@ def test_on_a_turning_shell_the_path_is_in_the_shells_frame():
     rows = []
     for row, angle in enumerate(angles):
         turned = pin.SE3(pin.utils.rotate("z", angle), np.zeros(3)) * placement
-        rows.append(
-            {
-                "row": row,
-                "point_world": turned.act(on_shell[row]),
-                "normal_world": turned.rotation @ [0, 0, 1.0],
-            }
-        )
+        point, normal = turned.act(on_shell[row]), turned.rotation[:, 2]
+        rows.append({"row": row, "point_world": point, "normal_world": normal})
     q = [stand_ins.ball_configuration(np.zeros(3), angle) for angle in angles]
     (path,) = contact_paths(stand_ins.a_result(angles, q, rows), stand_ins.a_scene(model, pair))
     np.testing.assert_allclose(path.points, on_shell, atol=1e-14)
@@ -49,6 +44,5 @@ def test_of_several_contacts_the_hardest_marks_the_path():
 def test_spacing_keeps_the_ends_and_drops_the_crowd():
     points = np.column_stack((np.linspace(0, 1, 10_001), np.zeros((10_001, 2))))
     kept = spaced(points, 0.1)
-    assert kept[0] == 0
-    assert kept[-1] == 10_000
+    assert (kept[0], kept[-1]) == (0, 10_000)
     assert len(kept) <= 12

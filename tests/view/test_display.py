@@ -2,7 +2,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import ImpactLaw, Plane, Scene, Shell, Sphere
+from sphshell_pin import ImpactLaw, Plane, Scene, Sphere
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view import Display
 from sphshell_pin.view.camera import choose_view
@@ -24,19 +24,17 @@ def filmed(scene, q, contacts=None, **options):
     return film.matrices, list(film.objects)
 
 
-def turntable_scene():
+def test_shells_and_spheres_move_with_their_bodies():
     model = ball_model()
     placement = pin.SE3(pin.utils.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.4, 0.0, 0.1]))
     pair = contact_pair(model, "ball", 0.05, plate(name="disc"), "table", placement)
-    return a_scene(model, pair)
-
-
-def test_shells_and_spheres_move_with_their_bodies():
-    scene = turntable_scene()
+    scene = a_scene(model, pair)
     where, _ = filmed(scene, ball_configuration([1.0, 2.0, 3.0], 0.7))
     expected = pin.SE3(pin.utils.rotate("z", 0.7), np.zeros(3)) * scene.pairs[0].shells[0].placement
     np.testing.assert_allclose(where["shells/0_disc"], expected.homogeneous, atol=1e-12)
     np.testing.assert_allclose(where["spheres/0_tip"][:3, 3], [1.0, 2.0, 3.0])
+    with pytest.raises(InvalidParameter, match=r"\(8,\)"):
+        filmed(scene, np.zeros(3))
 
 
 def test_both_of_two_spheres_are_drawn():
@@ -84,12 +82,10 @@ def test_a_model_without_geometry_gets_a_skeleton():
     where, _ = filmed(scene, q)
     data = model.createData()
     pin.forwardKinematics(model, data, q)
-    elbow = model.getJointId("elbow_joint")
-    rod = where["robot/links/elbow_joint"]
-    np.testing.assert_allclose((rod @ [0, 0.5, 0, 1])[:3], data.oMi[elbow].translation, atol=1e-12)
-    np.testing.assert_allclose(
-        (rod @ [0, -0.5, 0, 1])[:3], data.oMi[model.parents[elbow]].translation, atol=1e-12
-    )
+    elbow, rod = model.getJointId("elbow_joint"), where["robot/links/elbow_joint"]
+    for joint, end in ((elbow, 0.5), (model.parents[elbow], -0.5)):
+        place = data.oMi[joint].translation
+        np.testing.assert_allclose((rod @ [0, end, 0, 1])[:3], place, atol=1e-12)
     for matrix in where.values():
         assert np.linalg.norm(matrix[:3, :3], axis=0).min() > 0.0
 
@@ -117,20 +113,11 @@ def test_geometry_of_another_model_is_refused():
         filmed(scene, pin.neutral(reduced), visual_model=geometry)
 
 
-def test_wrong_arguments_are_named():
-    scene = turntable_scene()
-    canvas = Film().canvas
-    display = Display(scene, visualizer=canvas)
-    with pytest.raises(InvalidParameter, match=r"\(8,\)"):
-        display.update(np.zeros(3))
-
-
 def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
     model = ball_model()
     scene = Scene(model)
     tilted = Plane("table", (0.0, 0.0, -0.5), (1.0, 0.0, 1.0))
-    foot = Shell([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
-    scene.add_contact(tilted, foot, frame="ball", law=ImpactLaw(1e4), name="on")
+    scene.add_contact(tilted, plate(), frame="ball", law=ImpactLaw(1e4), name="on")
     q = ball_configuration([30.0, 2.0, 3.0], 0.7)
     where, drawn = filmed(scene, q)
     square = where["planes/0_on"]

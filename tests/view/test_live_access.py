@@ -22,12 +22,10 @@ def connects(live, url, **headers):
     """Return the status with which a websocket is answered."""
 
     async def visit():
-        client = Client(url)
         try:
-            await client.open(**headers)
+            (await Client(url).open(**headers)).socket.close()
         except HTTPClientError as refused:
             return refused.code
-        client.socket.close()
         return 101
 
     return run(visit())
@@ -64,19 +62,20 @@ def test_no_page_may_frame_it(live):
 
 
 def test_other_sites_are_refused(live, caplog):
-    own = f"127.0.0.1:{live.server.port}"
+    port = live.server.port
+    own, rebound = f"127.0.0.1:{port}", f"evil.example:{port}"
     assert connects(live, live.url, Origin=f"http://{own}") == 101
+    beside = f"http://127.0.0.1:{port + 1}"
     for origin in (
         "http://evil.example",
         "null",
         "http://[bad",
         "",
-        f"http://127.0.0.1:{live.server.port + 1}",
+        beside,
         f"http://{own}@evil.example",
     ):
         assert connects(live, live.url, Origin=origin) == 403
     # A name of the other site's own that was made to lead here.
-    rebound = f"evil.example:{live.server.port}"
     assert connects(live, live.url, Origin=f"http://{rebound}", Host=rebound) == 403
     assert not caplog.records
 
@@ -118,21 +117,23 @@ def test_a_token_of_ones_own(monkeypatch):
     access.process_token.cache_clear()
 
 
+TO_HERE = b"Host: 127.0.0.1\r\n"
+FRAME = (
+    b"GET /TOKEN/socket HTTP/1.1\r\n" + TO_HERE + b"Upgrade: websocket\r\nConnection: Upgrade\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: permessage-deflate\r\n"
+    b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n\xc1\xff\x7f\xff" + 20 * b"\xff"
+)
+POST = b"POST / HTTP/1.1\r\n" + TO_HERE
 HOSTILE = {
     "no HTTP": b"\x16\x03\x01\x02\x00\x01\x00\r\n\r\n",
     "no host": b"GET / HTTP/1.1\r\n\r\n",
-    "no text": b"GET /\xff\xfe?token=%ff%00 HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    "a bad address": b"GET //[bad/?token=x HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    "a long header": b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: " + 100_000 * b"x",
-    "a large body": b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 9999999999\r\n\r\n",
-    "a bad body": b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
-    "compressed": b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Encoding: gzip\r\n"
-    b"Content-Length: 3\r\n\r\nabc",
-    "a bad frame": b"GET /TOKEN/socket HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
-    b"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\nSec-WebSocket-Extensions: "
-    b"permessage-deflate\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n\xc1\xff\x7f\xff"
-    + 20
-    * b"\xff",
+    "no text": b"GET /\xff\xfe?token=%ff%00 HTTP/1.1\r\n" + TO_HERE + b"\r\n",
+    "a bad address": b"GET //[bad/?token=x HTTP/1.1\r\n" + TO_HERE + b"\r\n",
+    "a long header": b"GET / HTTP/1.1\r\n" + TO_HERE + b"X: " + 100_000 * b"x",
+    "a large body": POST + b"Content-Length: 9999999999\r\n\r\n",
+    "a bad body": POST + b"Transfer-Encoding: chunked\r\n\r\nzz\r\n",
+    "compressed": POST + b"Content-Encoding: gzip\r\nContent-Length: 3\r\n\r\nabc",
+    "a bad frame": FRAME,
 }
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.scenario.running.rows import Rows, Series
-from sphshell_pin.view.live.charts import MOST_KEPT, MOST_POINTS, Charts, History, Thinner
+from sphshell_pin.view.live.charts import MOST_KEPT, Charts, History, Thinner
 
 
 def rows_of(t, normal, **more):
@@ -31,8 +31,7 @@ def test_the_peak_of_each_piece_of_time_is_kept():
     for piece in np.split(np.arange(5000), cuts):  # as frames bring them, some of them empty
         points += thinner.add(t[piece], values[piece], 0.01)
     points += thinner.end()
-    pieces = np.floor(t / 0.01)
-    expected = []
+    pieces, expected = np.floor(t / 0.01), []
     for k in np.unique(pieces):
         inside = values[pieces == k]
         largest = inside[np.abs(inside).argmax(axis=0), [0, 1]]
@@ -90,46 +89,19 @@ def test_only_the_curves_that_are_asked_for_are_computed():
 
 def test_forces_are_summed_and_listed_by_pair():
     charts = charts_of()
-    assert [(one["key"], one["unit"]) for one in charts.descriptions()] == [
-        ("normal", "N"),
-        ("friction", "N"),
-        ("normal.left", "N"),
-        ("friction.left", "N"),
-        ("normal.right", "N"),
-        ("friction.right", "N"),
-        ("depth.left", "mm"),
-        ("depth.right", "mm"),
+    forces = [
+        "normal",
+        "friction",
+        *(f"{n}.{k}" for k in ("left", "right") for n in ("normal", "friction")),
     ]
+    units = dict.fromkeys(forces, "N") | dict.fromkeys(("depth.left", "depth.right"), "mm")
+    assert {one["key"]: one["unit"] for one in charts.descriptions()} == units
     charts.ask("tab", ["depth.right", "friction.left", "normal"])
     assert charts.keys == ("normal", "friction.left", "depth.right")
     charts.add(rows_of([0.0, 1.0], [[1, 2], [3, 4]]), 1.0)
     assert charts.again(0.0, 1.0) == [[0.0, 3.0, 0.5, pytest.approx(0.2)]]
     single = charts_of(["tip"])
     assert [one["key"] for one in single.descriptions()] == ["normal", "friction", "depth.tip"]
-
-
-def test_the_run_before_and_a_kept_one_are_there_to_compare_with():
-    charts = charts_of(["tip"])
-    charts.ask("tab", ["normal"])
-    charts.add(rows_of([0.0, 0.25, 0.5], [1, 2, 3]), 0.25)
-    charts.keep()
-    charts.add(rows_of([0.75, 1.0], [4, 5]), 0.25)
-    charts.start_anew()
-    assert charts.points("kept", 0.25) == [[0.0, 1.0], [0.25, 2.0], [0.5, 3.0]]
-    assert [row[1] for row in charts.points("last", 0.25)] == [1, 2, 3, 4, 5]
-    charts.add(rows_of([0.0], [9]), 0.1)
-    charts.start_anew()
-    assert charts.points("last", 0.1) == [[0.0, 9.0]]
-    assert len(charts.points("kept", 0.1)) == 3
-    charts.start_anew()  # twice: the run between them had no time
-    assert charts.points("last", 0.1) == [[0.0, 9.0]]
-    # A curve that is chosen later is there, too; a run of many rows stays small.
-    charts.ask("tab", ["depth.tip"])
-    assert charts.points("last", 0.1)[0] == pytest.approx([0.0, 0.9])
-    t = np.arange(30_000) * 5e-3
-    charts.add(rows_of(t, np.sin(t)), 0.01)
-    charts.start_anew()
-    assert MOST_POINTS / 2 < len(charts.points("last", 0.01)) <= MOST_POINTS + 2
 
 
 def test_a_block_that_was_not_recorded_at_first_is_no_number_there():

@@ -8,18 +8,14 @@ import webbrowser
 
 import pytest
 
-from sphshell_pin.scenario import run_scenario
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.view.live import Live, opening
-from tests.command import call
-from tests.scenario.files import without_pictures, write
+from tests.command import call, refused
+from tests.programs import HEARS_CTRL_C
+from tests.scenario.files import write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
-
-# Tests that run in the background pass on that Ctrl-C is to be ignored.
-ENTRY = (
-    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    "from sphshell_pin.cli import main; main()"
-)
 
 
 def view(*arguments):
@@ -29,25 +25,15 @@ def view(*arguments):
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory):
     folder = tmp_path_factory.mktemp("finished")
-    with without_pictures():
-        run_scenario(write(folder), folder / "out", recording=False)
-    return folder / "out"
-
-
-def started(*arguments):
-    process = subprocess.Popen(
-        [sys.executable, "-c", ENTRY, "view", *map(str, arguments), "--no-open"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    return process, process.stdout.readline().split()[0]
+    simulate(build(write(folder)))[0].save(folder / "run.npz")
+    return folder
 
 
 def test_it_serves_a_page_and_ctrl_c_ends_it(tmp_path):
-    process, url = started(write(tmp_path))
+    command = [sys.executable, "-c", HEARS_CTRL_C, "view", write(tmp_path), "--no-open"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        assert get(url)[0] == 200
+        assert get(process.stdout.readline().split()[0])[0] == 200
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
         rest, errors = process.communicate(timeout=20)
@@ -79,11 +65,7 @@ def test_faults_are_one_sentence(tmp_path, finished):
             ([tmp_path], "has no run.npz"),
             ([finished, "--scenario", "gear_contact"], "nq"),
         ):
-            told = view(*arguments, "--no-open")
-            assert told.exit_code == 2, arguments
-            assert words in told.stderr
-            assert told.stderr.count("\n") == 1
-            assert "Traceback" not in told.output
+            assert words in refused("view", *arguments, "--no-open")
 
 
 def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path):

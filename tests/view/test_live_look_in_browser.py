@@ -1,6 +1,5 @@
 """How the live page looks and reads: sizes, light and dark, contrast, targets, names, keys."""
 
-import itertools
 import re
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from sphshell_pin.scenario.live.live_run import LiveRun
 from sphshell_pin.view.live import Live
 from tests.scenario.files import DROP, write
 from tests.texts import text_of
+from tests.view.layout import BOXES, overlapping
 from tests.view.test_live_in_browser import Tab
 
 pytestmark = pytest.mark.browser
@@ -19,8 +19,7 @@ pytestmark = pytest.mark.browser
 DOCS = Path(__file__).parents[2] / "docs" / "view.md"
 NARROW = [(390, 844), (844, 390), (768, 1024), (320, 568)]
 WIDE = [(1920, 1080), (1440, 900), (1280, 720), (900, 500)]
-FRICTION = """damping = 20.0 }
-friction = { type = "coulomb", mu_static = 0.3 }"""
+FRICTION = 'damping = 20.0 }\nfriction = { type = "coulomb", mu_static = 0.3 }'
 KNOB = '\n[[knob]]\nkey = "contact.ball-plate.law.stiffness"\n'
 SCENARIO = DROP.replace("damping = 20.0 }", FRICTION) + KNOB
 
@@ -30,10 +29,8 @@ TARGETS = text_of("page/targets.js").rstrip()
 # Of each piece of text that is seen: its color, and the colors behind it from the nearest on.
 TEXTS = text_of("page/texts.js").rstrip()
 
-VARIABLES = """(names) => {
-  const style = getComputedStyle(document.documentElement);
-  return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(name).trim()]));
-}"""
+SKY = """["--sky", "--earth"].map((name) =>
+    getComputedStyle(document.documentElement).getPropertyValue(name).trim())"""
 
 
 class Look(Tab):
@@ -82,22 +79,11 @@ def test_nothing_is_cut_off_and_no_control_lies_over_another(look, size):
         .map((one) => one.innerText)""")
     assert cut == []
     for one in targets:
-        assert one["left"] >= -0.5, one
-        assert one["right"] <= size[0] + 0.5, one
-    floating = look.page.evaluate(
-        """[...document.querySelectorAll("#status, #legend, #stage button")]
-        .filter((one) => one.checkVisibility({visibilityProperty: true})).map((one) => {
-            const {left, right, top, bottom} = one.getBoundingClientRect();
-            return {name: one.id, left, right, top, bottom};
-        })"""
-    )
+        assert -0.5 <= one["left"] <= one["right"] <= size[0] + 0.5, one
+    floating = look.page.evaluate(BOXES, "#status, #legend, #stage button")
     assert {"status", "legend", "drag-mode"} <= {one["name"] for one in floating}
-    fixed = [one for one in targets if not one["floats"]]
-    pairs = itertools.chain(itertools.combinations(fixed, 2), itertools.combinations(floating, 2))
-    for a, b in pairs:
-        apart_x = min(a["right"], b["right"]) - max(a["left"], b["left"]) <= 0.5
-        apart_y = min(a["bottom"], b["bottom"]) - max(a["top"], b["top"]) <= 0.5
-        assert apart_x or apart_y, (a, b)
+    assert overlapping([one for one in targets if not one["floats"]], 0.5) == []
+    assert overlapping(floating, 0.5) == []
 
 
 @pytest.mark.parametrize("size", NARROW)
@@ -144,9 +130,9 @@ def test_all_text_has_contrast(look, scheme, size):
     look.click("#help-close")
     look.page.evaluate("document.getElementById('curves').open = false")
     assert len(texts) > 60
-    sky = look.page.evaluate(VARIABLES, ["--sky", "--earth"])
+    sky = look.page.evaluate(SKY)
     for text, color, behind in texts:
-        for below in sky.values():  # the scene lies below what is not opaque
+        for below in sky:  # the scene lies below what is not opaque
             ground = paint(behind, rgba(below)[0])
             assert contrast(paint([color], ground), ground) >= 4.5, (text, color, behind)
 
@@ -168,27 +154,19 @@ def test_messages_lie_over_no_line_of_the_legend(look, size):
       return boxes;
     }""")
     assert len(boxes) == 5
-    for a, b in itertools.combinations(boxes, 2):
-        apart_x = min(a["right"], b["right"]) <= max(a["left"], b["left"])
-        assert apart_x or min(a["bottom"], b["bottom"]) <= max(a["top"], b["top"]), (a, b)
+    assert overlapping(boxes) == []
 
 
 def test_every_control_has_a_name_and_messages_are_announced(look):
+    # A select is named by its label, not by its options; meshcat's own controls are hidden.
     nameless = look.page.evaluate("""() => [...document.querySelectorAll(
         "button, input, select, summary, canvas, iframe, dialog")].filter((one) => {
-            if (one.closest("#scene, .dg")) return false;  // meshcat's own controls are hidden
-            const named = one.getAttribute("aria-label") || one.textContent.trim() ||
-                (one.labels && one.labels[0]?.textContent.trim()) ||
-                document.getElementById(one.getAttribute("aria-labelledby"))?.textContent;
-            return !named;
+            if (one.closest("#scene, .dg")) return false;
+            const text = !one.matches("select, input") && one.textContent.trim();
+            return !(text || one.ariaLabel || one.labels?.[0]?.textContent.trim() ||
+                document.getElementById(one.getAttribute("aria-labelledby"))?.textContent);
         }).map((one) => one.outerHTML)""")
     assert nameless == []
-    # A select is named by its label, not by its options.
-    unlabelled = look.page.evaluate("""() => [...document.querySelectorAll("select, input")]
-        .filter((one) => !one.closest("#scene, .dg"))
-        .filter((one) => !one.labels?.length && !one.getAttribute("aria-label"))
-        .map((one) => one.outerHTML)""")
-    assert unlabelled == []
     live = look.page.evaluate("""() => ["notice", "toasts"].map((name) => {
         const one = document.getElementById(name);
         return one.getAttribute("aria-live") || one.getAttribute("role");
@@ -200,10 +178,8 @@ def test_the_overlay_lists_the_keys_that_the_documentation_has(look):
     look.page.keyboard.press("?")
     look.wait("document.getElementById('help').open")
     assert look.page.get_by_role("dialog", name="Keys").is_visible()
-    rows = look.page.evaluate(
-        """[...document.getElementById("keys").rows]
-        .map((row) => [...row.cells].map((one) => one.innerText))"""
-    )
+    cells = "(row) => [...row.cells].map((one) => one.innerText)"
+    rows = look.page.evaluate(f"[...document.getElementById('keys').rows].map({cells})")
     # Keys do nothing below the overlay.
     t = look.page.evaluate("state.t")
     look.page.keyboard.press("s")

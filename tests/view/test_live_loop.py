@@ -18,7 +18,18 @@ from tests.scenario.files import DROP, write
 from tests.view.live_driver import TAB, frames, say
 from tests.view.live_player import BallPlayer
 
-START_KNOB = '\n[[knob]]\nkey = "robot.ball.start.root_joint.2"\n'
+PUSH = {"body": "ball", "direction": [1.0, 0.0, 0.0]}
+
+
+@pytest.fixture
+def drop(make, tmp_path):
+    """Makes the live page of a drop with other text in its file."""
+
+    def drop(old="", new="", knob="", **options):
+        end = f'\n[[knob]]\nkey = "{knob}"\n' if knob else ""
+        return make(LiveRun(build(write(tmp_path, DROP.replace(old, new) + end))), **options)
+
+    return drop
 
 
 def test_time_runs_as_fast_as_asked(make):
@@ -85,27 +96,13 @@ def test_a_slider_that_is_dragged_is_one_change(make):
 
 def test_a_push_has_its_direction_force_and_time(make):
     live = make()
-    push = {"body": "ball", "direction": [0.0, 0.6, 0.8], "newtons": 10.0}
-    say(live, "push", **push, seconds=0.25)
+    say(live, "push", body="ball", direction=[0.0, 0.6, 0.8], newtons=10.0, seconds=0.25)
     live.frame(0.0)
     np.testing.assert_allclose(live.player.force, [0.0, 6.0, 8.0])
     assert live.player.push_end == 0.25
     frames(live, 60)
     # Impulse and momentum: F t = m v along y, which nothing else acts on.
     assert live.player.v[1] == pytest.approx(6.0 * 0.25, rel=0.01)
-
-
-def test_what_is_held_pushes_until_it_is_let_go(make):
-    live = make()
-    hold = {"body": "ball", "direction": [1.0, 0.0, 0.0], "newtons": 3.0}
-    say(live, "hold", **hold)
-    frames(live, 60)
-    assert live.player.v[0] == pytest.approx(3.0, rel=0.02)
-    live.server.leave(TAB)
-    frames(live, 2)
-    speed = live.player.v[0]
-    frames(live, 30)
-    assert live.player.v[0] == speed
 
 
 @pytest.mark.parametrize("what", ["player.advance", "picture.update"])
@@ -131,23 +128,23 @@ def test_what_fails_stops_the_run_says_why_and_can_start_again(make, monkeypatch
 
 
 class Clock:
-    """Stands in for the module `time`: only sleeping takes time."""
+    """Stands in for the module `time`: only sleeping takes time; at 7 s it calls `then`."""
 
-    def __init__(self, until, then):
-        self.now, self.until, self.then = 5.0, until, then
+    def __init__(self, then):
+        self.now, self.then = 5.0, then
 
     def perf_counter(self):
         return self.now
 
     def sleep(self, seconds):
         self.now += seconds
-        if self.now > self.until:
+        if self.now > 7.0:
             self.then()
 
 
 def test_it_keeps_real_time(make, monkeypatch):
     live = make(speed=0.5)
-    clock = Clock(until=7.0, then=live.stop)
+    clock = Clock(live.stop)
     monkeypatch.setattr(loop, "time", clock)
     live.run()
     assert live.player.time == pytest.approx(0.5 * (clock.now - 5.0), abs=1.0 / FPS)
@@ -178,21 +175,20 @@ def test_preview_tells_the_address_and_ends(monkeypatch):
     assert len(opened) == 1
 
 
-def test_fixed_steps_longer_than_a_frame_keep_the_speed(make, tmp_path):
+def test_fixed_steps_longer_than_a_frame_keep_the_speed(drop):
     """A step of 1 ms, a frame of 0.17 ms: one step in six frames."""
-    path = write(tmp_path, DROP.replace("dt = 1e-4", "dt = 1e-3"))
-    live = make(LiveRun(build(path)), speed=0.01)
+    live = drop("dt = 1e-4", "dt = 1e-3", speed=0.01)
     frames(live, 600)
     assert live.player.time == pytest.approx(0.1, abs=1.1e-3)
 
 
-def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(make, tmp_path):
-    live = make(LiveRun(build(write(tmp_path, DROP + START_KNOB))))
-    frames(live, 6)
-    say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=0.1, seconds=5.0)
-    frames(live, 1)
+def test_the_arrow_of_a_push_ends_where_a_knob_starts_the_run_anew(drop):
+    height = "robot.ball.start.root_joint.2"
+    live = drop(knob=height)
+    say(live, "push", **PUSH, newtons=0.1, seconds=5.0)
+    frames(live, 7)
     assert live._interaction.push is not None
-    say(live, "parameter", key="robot.ball.start.root_joint.2", value=0.05)
+    say(live, "parameter", key=height, value=0.05)
     frames(live, 1)
     assert live._interaction.push is None
 
@@ -201,7 +197,7 @@ def test_the_legend_says_where_arrows_are_cut(make):
     live = make(watched=True)
     frames(live, 60)
     assert live._state()["cut"] is False
-    say(live, "push", body="ball", direction=[1.0, 0.0, 0.0], newtons=1e6, seconds=1.0)
+    say(live, "push", **PUSH, newtons=1e6, seconds=1.0)
     live.running = False
     frames(live, 1)
     assert live._state()["cut"] is True
@@ -209,11 +205,9 @@ def test_the_legend_says_where_arrows_are_cut(make):
 
 def test_a_queue_of_steps_gives_way_to_others(make, monkeypatch):
     live, taken = make(), []
-    advance = live.player.advance
     monkeypatch.setattr(loop, "BUDGET", 1e-3)
-    monkeypatch.setattr(
-        live.player, "advance", lambda *a: (time.sleep(0.005), taken.append(1), advance(*a))[2]
-    )
+    advance = live.player.advance
+    live.player.advance = lambda *a: (time.sleep(0.005), taken.append(1), advance(*a))[2]
     for _ in range(100):
         say(live, "step", seconds=1e-3)
         say(live, "look")  # between steps of one tab, which count once
@@ -233,12 +227,11 @@ def test_a_queue_of_steps_gives_way_to_others(make, monkeypatch):
     ],
 )
 def test_a_value_that_cannot_be_is_answered_in_the_words_of_its_slider(
-    make, tmp_path, key, value, told
+    drop, tmp_path, key, value, told
 ):
-    friction = """friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2 }"""
+    friction = 'friction = { type = "coulomb", mu_static = 0.3, mu_dynamic = 0.2 }\n[run]'
     key = f"contact.ball-plate.{key}"
-    text = DROP.replace("[run]", f"{friction}\n[run]") + f'\n[[knob]]\nkey = "{key}"\n'
-    live = make(LiveRun(build(write(tmp_path, text))))
+    live = drop("[run]", friction, key)
     say(live, "parameter", key=key, value=value)
     frames(live, 1)
     ((client, answer),) = live.told

@@ -113,7 +113,6 @@ def test_a_scene_that_is_drawn_anew_again_and_again_does_not_grow(window, canvas
             put(canvas["shells"][f"s{k}"])
             mover(canvas["shells"][f"s{k}"])(place(k))
         window.commit()
-    _, message = window.news(0)
-    commands = umsgpack.unpackb(message)
+    commands = Browser(window).look().log
     assert len(commands) == 12  # one delete, ten objects, one move
     assert len(commands[-1]["paths"]) == 10

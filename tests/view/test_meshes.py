@@ -25,12 +25,7 @@ from sphshell_pin.view.robot import GeometryRobot
 from tests import urdf
 from tests.view.drawn import Film
 
-PAGE = (
-    Path(page_module.__file__)
-    .with_name("recording_page")
-    .joinpath("replay.js")
-    .read_text(encoding="utf-8")
-)
+PAGE = Path(page_module.__file__).parent / "recording_page" / "replay.js"
 
 
 def restored(packed):
@@ -69,20 +64,15 @@ def test_coordinates_keep_a_part_of_the_meshs_size_and_equal_ones_stay_equal():
 
 
 MESH = """<COLLADA><asset><unit meter="0.001"/></asset>
-<float_array id="p" count="{n}">{points}</float_array>
+<float_array id="p" count="1200">{points}</float_array>
 <p>{indices}</p><p>0 1 2</p><float_array id="odd">{odd}</float_array></COLLADA>"""
 
 
 def a_mesh():
-    points = 100.0 * sphere_points(400)
-    indices = np.arange(1200) // 2
-    text = MESH.format(
-        n=1200,
-        points=" ".join(f"{x:.6f}" for x in points.reshape(-1)),
-        indices=" ".join(map(str, indices)),
-        odd="1.0 NaN " * 50,
-    )
-    return text, points.reshape(-1), indices
+    points, indices = 100.0 * sphere_points(400).reshape(-1), np.arange(1200) // 2
+    listed = " ".join(f"{x:.6f}" for x in points)
+    text = MESH.format(points=listed, indices=" ".join(map(str, indices)), odd="1.0 NaN " * 50)
+    return text, points, indices
 
 
 def test_only_long_lists_of_numbers_are_taken_out():
@@ -111,12 +101,16 @@ def ball(rings=24):
     return np.concatenate(facets)
 
 
+def normals_of(corners):
+    """Unit normals (f, 3) of facets; nan of those without an area."""
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return doubled / np.linalg.norm(doubled, axis=1, keepdims=True)
+
+
 def stl(corners, title=b"", normals=None):
     """A binary STL file of these facets, written field by field."""
     parts = [title.ljust(80, b" "), len(corners).to_bytes(4, "little")]
-    if normals is None:
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals_of(corners) if normals is None else normals
     for normal, facet in zip(normals, corners, strict=True):
         parts += [np.vstack((normal, facet)).astype("<f4").tobytes(), b"\0\0"]
     return b"".join(parts)
@@ -136,9 +130,8 @@ def test_facets_keep_their_corners(title):
 
 @pytest.mark.browser
 def test_the_page_restores_collada_and_stl(browser):
-    functions = re.search(r"^function unfold.*?^function restore_facets.*?^}$", PAGE, re.S | re.M)[
-        0
-    ]
+    wanted = r"^function unfold.*?^function restore_facets.*?^}$"
+    functions = re.search(wanted, PAGE.read_text("utf-8"), re.S | re.M)[0]
     text, points, indices = a_mesh()
     rest, numbers = take_out_numbers(text)
     page = browser.new_page()
@@ -186,28 +179,20 @@ def stl_of(normals, corners):
 @pytest.mark.parametrize("kind", [0, 1])
 def test_facets_without_normals_are_lit(kind):
     corners = np.random.default_rng(3).normal(size=(40, 3, 3)).astype("<f4")
-    truth = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    truth /= np.linalg.norm(truth, axis=1)[:, None]
-    given = truth.copy()
-    given[::3] = 0.0
-    given[1::7] = np.nan
+    expected = normals_of(corners)
     if kind == 0:
-        given[2] = (0.0, 0.0, 1.0)  # what a binary file says stays
+        expected[2] = (0.0, 0.0, 1.0)  # what a binary file says stays
+    given = expected.copy()
+    given[::3], given[1::7] = 0.0, np.nan
     made = np.frombuffer(lit_facets(stl_of(given, corners)[kind]), STL_RECORD, -1, STL_HEADER)
-    expected = truth.copy()
-    if kind == 0:
-        expected[2] = given[2]
     np.testing.assert_allclose(made["normal"], expected, atol=2e-6)
     np.testing.assert_array_equal(made["corners"], corners)
 
 
 def test_files_with_normals_and_what_is_none_stay_as_they_are():
     corners = np.random.default_rng(3).normal(size=(4, 3, 3))
-    for data in (
-        stl_of(np.full((4, 3), 0.6), corners)[0],
-        b"",
-        b"solid a\nfacet normal 1\nendfacet",
-    ):
+    lit = stl_of(np.full((4, 3), 0.6), corners)[0]
+    for data in (lit, b"", b"solid a\nfacet normal 1\nendfacet"):
         assert lit_facets(data) is data
     # A facet without an area has no normal.
     flat = stl_of(np.zeros((1, 3)), np.zeros((1, 3, 3)))[0]

@@ -9,8 +9,10 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.errors import InvalidParameter, ResultError
-from sphshell_pin.scenario import build, run_built
-from tests.scenario.files import DROP, without_pictures, write
+from sphshell_pin.scenario import build
+from sphshell_pin.scenario.running.run import simulate
+from tests.scenario.files import DROP, write
+from tests.view.stand_ins import plate
 from tests.view.test_page import unpacked
 
 
@@ -19,9 +21,8 @@ def result(tmp_path_factory):
     """What was saved of a run, loaded again."""
     home = tmp_path_factory.mktemp("drop")
     text = DROP.replace("dt = 1e-4", "dt = 1e-4\nrecording_speed = 0.1")
-    with without_pictures():
-        run_built(build(write(home, text)), home / "out", recording=False)
-    return sp.Result.load(home / "out" / "run.npz")
+    result, _ = simulate(build(write(home, text)))
+    return sp.Result.load(result.save(home / "run.npz"))
 
 
 def test_a_loaded_result_shows_itself(result, tmp_path):
@@ -40,9 +41,7 @@ def test_a_loaded_result_shows_itself(result, tmp_path):
 def test_a_robot_without_geometry_is_hinted_where_it_is_seen(result):
     finger = robots.load("three_link_finger")
     scene = sp.Scene(finger.model)
-    wall = sp.Shell([[1, -1, -1], [1, 1, -1], [1, 1, 1], [1, -1, 1]], [[0, 1, 2, 3]])
-    law = sp.ImpactLaw(1e8, 1.5, 0, 1e-4)
-    scene.add_contact(sp.Sphere(0.01, "tip"), wall, law=law)
+    scene.add_contact(sp.Sphere(0.01, "tip"), plate(), law=sp.ImpactLaw(1e4))
     moved = sp.Simulation(scene).run([0.2, 0.6, 0.4], duration=0.01)
     bare = moved.view()
     assert "visual_model" in bare.hint

@@ -25,24 +25,21 @@ def unpacked(page):
     return commands
 
 
+NO_CLIP = {"animations": [{"clip": {"tracks": []}}]}
+
+
 def filmed(matrices, times):
     """Tracks by name, and the still transform, of one node with these poses."""
     window = FilmWindow()
     node = meshcat.Visualizer(window=window)["node"]
     for window.frame, matrix in enumerate(matrices):
         node.set_transform(matrix)
-    commands = window.commands(np.asarray(times, dtype=float))
-    tracks = {}
-    for command in commands:
-        if command["type"] == "set_animation":
-            for track in command["animations"][0]["clip"]["tracks"]:
-                width = 4 if track["type"] == "quaternion" else 3
-                tracks[track["name"]] = (
-                    np.frombuffer(track["times"].data, dtype="<f4"),
-                    np.frombuffer(track["values"].data, dtype="<f4").reshape(-1, width),
-                )
-    still = next(c["matrix"] for c in commands if c["type"] == "set_transform")
-    return tracks, np.reshape(still, (4, 4)).T
+    told = {one["type"]: one for one in window.commands(np.asarray(times, dtype=float))}
+    tracks, (clip,) = {}, told.get("set_animation", NO_CLIP)["animations"]
+    for track in clip["clip"]["tracks"]:
+        t, values = (np.frombuffer(track[name].data, "<f4") for name in ("times", "values"))
+        tracks[track["name"]] = t, values.reshape(len(t), -1)
+    return tracks, np.reshape(told["set_transform"]["matrix"], (4, 4)).T
 
 
 def test_tracks_compose_to_the_poses_that_were_filmed():
@@ -58,11 +55,8 @@ def test_tracks_compose_to_the_poses_that_were_filmed():
     for name in (".position", ".quaternion", ".scale"):
         np.testing.assert_allclose(tracks[name][0], times, rtol=1e-6)
     for k, matrix in enumerate(matrices):
-        composed = pose(
-            pin.Quaternion(tracks[".quaternion"][1][k].astype(float)).matrix(),
-            tracks[".position"][1][k],
-            tracks[".scale"][1][k],
-        )
+        rotation = pin.Quaternion(tracks[".quaternion"][1][k].astype(float)).matrix()
+        composed = pose(rotation, tracks[".position"][1][k], tracks[".scale"][1][k])
         np.testing.assert_allclose(composed, matrix, atol=2e-6)
 
 
@@ -133,5 +127,4 @@ def test_a_page_needs_nothing_from_anywhere_and_escapes_what_it_is_told():
     assert "three.js authors" in notices
     assert notices.count("Permission is hereby granted") >= 4
     # The same scene gives the same page, byte by byte.
-    again = render_page(commands, title, [("#ff0000", "5 < 6")])
-    assert page == again
+    assert page == render_page(commands, title, [("#ff0000", "5 < 6")])

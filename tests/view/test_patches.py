@@ -11,12 +11,8 @@ from tests.view.stand_ins import contact_log
 
 def some_patches(*rows):
     patches = np.zeros(len(rows), PATCH)
-    for patch, (a, b, pressure) in zip(patches, rows, strict=True):
-        patch["half_axes"], patch["axis_world"], patch["peak_pressure"] = (
-            (a, b),
-            (0, 1, 0),
-            pressure,
-        )
+    *axes, patches["peak_pressure"] = np.transpose(rows)
+    patches["half_axes"], patches["axis_world"] = np.transpose(axes), (0, 1, 0)
     return patches
 
 

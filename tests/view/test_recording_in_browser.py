@@ -49,10 +49,6 @@ def opened(browser):
 def at_time(page, time):
     """Pause, scrub to `time` [s] and return the picture (h, w, 3)."""
     page.evaluate("time => { recording.film('fit', false); recording.draw(time); }", time)
-    return picture(page)
-
-
-def picture(page):
     # The captions may lie over what is looked for.
     page.add_style_tag(content="#head, #key, #views { visibility: hidden !important; }")
     return pixels_of(page.screenshot())

@@ -5,7 +5,8 @@ import pytest
 
 from sphshell_pin.view import write_recording
 from sphshell_pin.view.curves import BINS, run_curves
-from tests.view.stand_ins import a_result, ball_configuration, ball_on_plate
+from tests.view.layout import BOXES, overlapping
+from tests.view.stand_ins import a_result, ball_on_plate
 from tests.view.test_recording_in_browser import watch
 
 SIZES = {"wide": (1100, 640), "narrow": (390, 844)}
@@ -27,17 +28,12 @@ def opened(browser, ball):
     """Opens the recording in a window; complaints and requests of it end the tests."""
     contexts, complaints = {}, []
 
-    def page_of(size="wide", scheme="light", motion="reduce"):
-        key = size, scheme, motion
+    def page_of(size="wide", scheme="light"):
+        key = size, scheme
         if key not in contexts:
-            width, height = SIZES[size]
-            context = browser.new_context(
-                viewport={"width": width, "height": height},
-                color_scheme=scheme,
-                reduced_motion=motion,
-                offline=True,
-            )
-            page = contexts[key] = context.new_page()
+            viewport = dict(zip(("width", "height"), SIZES[size], strict=True))
+            more = {"color_scheme": scheme, "reduced_motion": "reduce", "offline": True}
+            page = contexts[key] = browser.new_context(viewport=viewport, **more).new_page()
             complaints.append(watch(page, "file:"))
             page.goto(ball[1].resolve().as_uri())
             page.wait_for_function("window.recording", timeout=60_000)
@@ -58,11 +54,8 @@ def page(opened):
 
 def ball_place(page):
     """Where the scene has the ball [m]."""
-    return np.array(
-        page.evaluate(
-            "viewer.scene_tree.find(['meshcat', 'spheres', '0_ball']).object.position.toArray()"
-        )
-    )
+    ball = "viewer.scene_tree.find(['meshcat', 'spheres', '0_ball']).object"
+    return np.array(page.evaluate(f"{ball}.position.toArray()"))
 
 
 def time_of(page):
@@ -94,13 +87,8 @@ def test_chart_scrub_bar_and_scene_show_the_same_time(page, ball):
         page.mouse.click(box["x"] + at, box["y"] + 30)
         assert time_of(page) == pytest.approx(share * result.t[-1], abs=0.01)
         check_agreement(page, result)
-        ink = page.evaluate(
-            """at => {
-                const canvas = document.getElementById("chart"), pen = canvas.getContext("2d");
-                return [...pen.getImageData(Math.round(at) - 2, 0, 5, canvas.height).data];
-            }""",
-            at,
-        )
+        pen = "chart.getContext('2d').getImageData(Math.round(at) - 2, 0, 5, chart.height)"
+        ink = page.evaluate(f"at => [...{pen}.data]", at)
         darkest = np.reshape(ink, (-1, 5, 4))[:, :, :3].sum(axis=2).min(axis=1)
         assert np.median(darkest) < 3 * 70  # the line of the cursor, from top to bottom
     page.locator("#scrub").fill("1.25")
@@ -117,37 +105,34 @@ def test_chart_scrub_bar_and_scene_show_the_same_time(page, ball):
 @pytest.mark.browser
 def test_keys(page, ball):
     end = float(ball[0].t[-1])
-    page.keyboard.press("End")
-    assert time_of(page) == end
-    page.keyboard.press("ArrowLeft")
-    assert time_of(page) == pytest.approx(end - STEP)
-    page.keyboard.press("Shift+ArrowLeft")
-    assert time_of(page) == pytest.approx(end - 11 * STEP)
-    page.keyboard.press("ArrowRight")
-    assert time_of(page) == pytest.approx(end - 10 * STEP)
-    page.keyboard.press("Home")
-    assert time_of(page) == 0.0
+    for key, time in (
+        ("End", end),
+        ("ArrowLeft", end - STEP),
+        ("Shift+ArrowLeft", end - 11 * STEP),
+        ("ArrowRight", end - 10 * STEP),
+        ("Home", 0.0),
+    ):
+        page.keyboard.press(key)
+        assert time_of(page) == pytest.approx(time)
     page.evaluate("recording.rate = 0.01")  # not at its end before the next key
     page.get_by_role("button", name="Play", exact=True).click()
     assert page.evaluate("recording.playing")
     page.wait_for_function("recording.time > 0")
     page.keyboard.press("Space")
-    assert not page.evaluate("recording.playing")
     page.evaluate("recording.rate = 1.0")
-    page.keyboard.press("ArrowDown")
-    assert page.evaluate("recording.rate") == 0.5
-    page.keyboard.press("ArrowUp")
-    assert page.evaluate("recording.rate") == 1.0
-    page.keyboard.press("4")
-    assert page.evaluate("recording.cameras.name") == "top"
-    page.keyboard.press("c")
-    assert not page.locator("#chart").is_visible()
-    page.keyboard.press("c")
-    assert page.locator("#chart").is_visible()
-    page.keyboard.press("?")
-    assert page.locator("#help").is_visible()
-    page.keyboard.press("Escape")
-    assert not page.locator("#help").is_visible()
+    shown = "document.getElementById('{}').checkVisibility()"
+    for key, what, value in (
+        ("ArrowDown", "recording.rate", 0.5),
+        ("ArrowUp", "recording.rate", 1.0),
+        ("4", "recording.cameras.name", "top"),
+        ("c", shown.format("chart"), False),
+        ("c", shown.format("chart"), True),
+        ("?", shown.format("help"), True),
+        ("Escape", shown.format("help"), False),
+    ):
+        assert not page.evaluate("recording.playing")
+        page.keyboard.press(key)
+        assert page.evaluate(what) == value, key
 
 
 @pytest.mark.browser
@@ -196,40 +181,24 @@ def test_text_of_a_run_is_no_code(page, ball):
 def test_nothing_is_cut_off_or_overlaps(opened, size, scheme):
     page = opened(size, scheme)
     width, height = SIZES[size]
-    parts = page.evaluate(
-        """() => [...document.querySelectorAll(
-                "h1, button, select, #scrub, #clock, .reading, summary")]
-            .filter((one) => one.checkVisibility() && one.getClientRects().length)
-            .map((one) => { const r = one.getBoundingClientRect();
-                return [one.id || one.textContent, r.left, r.top, r.right, r.bottom]; })"""
-    )
+    parts = page.evaluate(BOXES, "h1, button, select, #scrub, #clock, .reading, summary")
     assert len(parts) > 15
-    for name, left, top, right, bottom in parts:
-        assert 0 <= left < right <= width, name
-        assert 0 <= top < bottom <= height, name
-    for k, (name, left, top, right, bottom) in enumerate(parts):
-        for other, left_, top_, right_, bottom_ in parts[:k]:
-            apart = right <= left_ or right_ <= left or bottom <= top_ or bottom_ <= top
-            assert apart, (name, other)
+    for one in parts:
+        assert 0 <= one["left"] < one["right"] <= width, one
+        assert 0 <= one["top"] < one["bottom"] <= height, one
+    assert overlapping(parts) == []
     assert page.evaluate("document.documentElement.scrollWidth") <= width
-    backgrounds = page.evaluate(
-        """() => {
-            const dock = getComputedStyle(document.getElementById("dock"));
-            return [dock.backgroundColor.match(/\\d+/g).map(Number),
-                viewer.scene_tree.find(["Background"]).object.top_color];
-        }"""
-    )
-    for color in backgrounds:
+    dock = "getComputedStyle(document.getElementById('dock')).backgroundColor"
+    sky = "viewer.scene_tree.find(['Background']).object.top_color"
+    for color in page.evaluate(f"[{dock}.match(/\\d+/g).map(Number), {sky}]"):
         assert (np.mean(color) < 80) == (scheme == "dark")
 
 
 def test_curves_keep_every_peak_of_a_long_run():
     t = np.linspace(0.0, 5.0, 50_001)
-    q = np.tile(ball_configuration([0, 0, 0.05]), (len(t), 1))
-    rows = [{"row": row, "normal_force": 1.0, "depth": 1e-5} for row in range(0, len(t), 7)]
-    rows += [{"row": 12_345, "normal_force": 50.0, "depth": 3e-4}]
-    result = a_result(t, q, rows, ("tip",))
-    (curve,) = run_curves(result, len(t))
+    rows = [{"row": row, "normal_force": 1.0} for row in range(0, len(t), 7)]
+    rows += [{"row": 12_345, "normal_force": 50.0}]
+    (curve,) = run_curves(a_result(t, np.zeros((len(t), 8)), rows), len(t))
     assert len(curve.t) <= 4 * BINS + 2
     assert curve.normal.max() == curve.figures["peak"] == 50.0
     assert curve.t[np.argmax(curve.normal)] == t[12_345]
@@ -237,16 +206,13 @@ def test_curves_keep_every_peak_of_a_long_run():
 
 
 def test_curves_of_several_pairs_begin_with_their_sum():
-    t = np.array([0.0, 1.0, 2.0])
-    q = np.tile(ball_configuration([0, 0, 0.05]), (3, 1))
     rows = [
         {"row": 1, "pair": 0, "normal_force": 1.0, "friction_force_world": [3.0, 4.0, 0.0]},
         {"row": 1, "pair": 2, "normal_force": 2.0},
     ]
-    curves = run_curves(a_result(t, q, rows, ("a", "b", "c")), 3)
+    curves = run_curves(a_result([0.0, 1.0, 2.0], np.zeros((3, 8)), rows, ("a", "b", "c")), 3)
     assert [one.name for one in curves] == ["all pairs, summed", "c", "a"]
     assert curves[0].normal.tolist() == [0.0, 3.0, 0.0]
     assert curves[0].friction.tolist() == [0.0, 5.0, 0.0]
     # The trapezoids of a touch at one row of three.
-    assert curves[0].figures["contact_time"] == 1.0
-    assert curves[0].figures["mean"] == 3.0
+    assert (curves[0].figures["contact_time"], curves[0].figures["mean"]) == (1.0, 3.0)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from sphshell_pin.base import upward
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
 from sphshell_pin.base.summary import Fact, Summarized
@@ -226,9 +227,7 @@ class Result(Summarized):
         Raises ResultError without a scene, for a time before 1970 and where the file cannot be
         written, MissingExtra without mcap.
         """
-        from sphshell_pin.export.mcap import write_mcap
-
-        return write_mcap(path, self, scene, start=start)
+        return upward.layers.write_mcap(path, self, scene, start=start)
 
     def plot(self, kind: str = "overview", scene: Scene | None = None) -> Figure:
         """Return a figure, which a notebook shows.
@@ -241,15 +240,11 @@ class Result(Summarized):
         Raises NameNotFound for another kind, MissingExtra without matplotlib, ResultError where
         there is no scene for the map or it cannot be built again.
         """
-        from sphshell_pin.plot import plot_result
-
-        return plot_result(self, kind, scene)
+        return upward.layers.plot_result(self, kind, scene)
 
     def save_figures(self, folder: str | PathLike[str], scene: Scene | None = None) -> list[Path]:
         """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
-        from sphshell_pin.plot import save_figures
-
-        return save_figures(self, folder, scene=scene)
+        return upward.layers.save_figures(self, folder, scene=scene)
 
     def view(
         self,
@@ -269,9 +264,9 @@ class Result(Summarized):
 
         Raises ResultError without a scene, MissingExtra without meshcat.
         """
-        from sphshell_pin.view.recording import view_result
-
-        return view_result(self, scene, visual_model, speed=speed, height=height, title=title)
+        return upward.layers.view_result(
+            self, scene, visual_model, speed=speed, height=height, title=title
+        )
 
     def render(
         self,
@@ -289,9 +284,7 @@ class Result(Summarized):
         Raises what `render_film` does: MissingExtra without playwright, ResultError without
         Chromium.
         """
-        from sphshell_pin.view.film import render_film
-
-        return render_film(path, self, scene, visual_model, **options)
+        return upward.layers.render_film(path, self, scene, visual_model, **options)
 
 
 def _owners(pairs: tuple[str, ...], scene: Scene) -> dict[str, tuple[str, ...]]:

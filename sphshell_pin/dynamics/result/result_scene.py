@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from sphshell_pin.base import upward
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -16,9 +17,7 @@ def find_scene(result: Result, scene: Scene | None = None) -> Scene | None:
     """
     scene = result.scene if scene is None else scene
     if scene is None and result.origin is not None:
-        from sphshell_pin.scenario.running.replay import Replay
-
-        scene = Replay(result).scene
+        scene = upward.layers.rebuild_scene(result)
     if scene is not None and not isinstance(getattr(scene, "pairs", None), tuple):
         raise InvalidParameter("scene", scene, "must be a Scene")
     return scene

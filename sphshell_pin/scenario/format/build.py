@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-import sphshell_pin as sp
 from sphshell_pin import errors
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.parameters import Component, parameters_of
@@ -20,14 +19,18 @@ from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.function_laws import FunctionFile, FunctionFrictionFile
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.control import controllers
+from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.run.advance import many_rows
+from sphshell_pin.dynamics.run.simulation import Simulation
 from sphshell_pin.dynamics.scene.explain import Explanation
+from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.dynamics.sensing.sensors import Sensor, check_sensors
 from sphshell_pin.robots import LoadedRobot
 from sphshell_pin.scenario.format import bodies, reading, schema
 from sphshell_pin.scenario.format.components import joint_components, spheres_of, to_end, to_sphere
 from sphshell_pin.scenario.format.functions import Loader, Modules, load_function
 from sphshell_pin.scenario.format.sliders import check_knobs, has_number, number_in, with_numbers
+from sphshell_pin.shell.shell import Shell
 
 # A user's own; what it takes depends on where the scenario names it.
 Function = Callable[..., Any]
@@ -40,20 +43,20 @@ class Built(Summarized):
     name: str
     path: Path
     scenario: schema.Scenario
-    scene: sp.Scene
+    scene: Scene
     q0: Array
     v0: Array
     controller: controllers.Controller | controllers.Callback | None
-    simulation: sp.Simulation
+    simulation: Simulation
     visual_model: pin.GeometryModel
     """Geometry of the scene's model."""
     assembly: bodies.Assembly
     """The robots as one model; the same object as before where a rebuild could keep it."""
-    shells: Mapping[str, sp.Shell]
+    shells: Mapping[str, Shell]
     """The surfaces by name; the same objects as before where a rebuild could keep them."""
     functions: Mapping[str, Function]
     """The user's own functions by "file.py:function", loaded once."""
-    figures: Mapping[str, Callable[[sp.Result, sp.Scene], float]]
+    figures: Mapping[str, Callable[[Result, Scene], float]]
     """The scenario's own figures: functions of (result, scene)."""
 
     @property
@@ -148,7 +151,7 @@ def build_scenario(
     *,
     function: Loader = load_function,
     robots: Mapping[tuple[object, ...], LoadedRobot] | None = None,
-    surfaces: Mapping[str, sp.Shell] | None = None,
+    surfaces: Mapping[str, Shell] | None = None,
 ) -> Built:
     """Build a scenario that is already read; `path` is its file, which others stand beside.
 
@@ -171,7 +174,7 @@ def build_scenario(
         if scenario.contact:
             bodies.check_masses(assembly, assembly.lock)
         joints = joint_components(scenario, assembly, path)
-        scene = sp.Scene(
+        scene = Scene(
             assembly.model,
             lock=assembly.lock,
             q_lock=q_lock,
@@ -203,7 +206,7 @@ def build_scenario(
     controller = _build_controller(scenario.controller, scene, q0, shells, path, load)
     sensors = _build_sensors(scenario.sensor, scene, path)
     with bodies.blamed_on(path, "run"):
-        simulation = sp.Simulation(scene, scenario.run.made(), sensors)
+        simulation = Simulation(scene, scenario.run.made(), sensors)
     figures = {
         figure: load(where, f"figures.{figure}") for figure, where in scenario.figures.items()
     }
@@ -246,7 +249,7 @@ def _assemble(
     return replace(reuse.assembly, model=model)
 
 
-def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> sp.Shell | None:
+def _kept_shell(section: schema.ShellSection, reuse: Built | None) -> Shell | None:
     """Return the shell of the same table in `reuse`; where it stands is no part of a shell."""
     if reuse is None:
         return None
@@ -271,7 +274,7 @@ def explain_built(built: Built) -> Explanation:
     return replace(said, warnings=(*said.warnings, *setup))
 
 
-def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell:
+def _build_shell(section: schema.ShellSection, path: Path, key: str) -> Shell:
     options: dict[str, Any] = {
         name: getattr(section, name) for name in ("chord_error", "side", "name")
     }
@@ -285,7 +288,7 @@ def _build_shell(section: schema.ShellSection, path: Path, key: str) -> sp.Shell
                 raise errors.SphshellError(f"surface {file}: {reason}")
             of_files = ("unit", "scale", "bodies", "faces", "time_limit", "memory_limit")
             options |= {name: getattr(section, name) for name in of_files}
-            shell = sp.Shell.from_file(file, **options)
+            shell = Shell.from_file(file, **options)
         return shell if section.magnify == 1.0 else shell.transformed(scale=section.magnify)
 
 
@@ -315,7 +318,7 @@ def _find_shell(
 
 
 def _add_contact(
-    scene: sp.Scene,
+    scene: Scene,
     contact: schema.ContactSection,
     laws: tuple[NormalLaw, Friction | None],
     shells: Mapping[str, controllers.ShellPlace],
@@ -343,7 +346,7 @@ def _add_contact(
             scene.add_contacts(several, *touched, **how)
 
 
-def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> tuple[Sensor, ...]:
+def _build_sensors(stated: Sequence[Component], scene: Scene, path: Path) -> tuple[Sensor, ...]:
     for i, one in enumerate(stated):
         with bodies.blamed_on(path, reading.item_key("sensor", stated, i)):
             assert isinstance(one, Sensor)
@@ -355,7 +358,7 @@ def _build_sensors(stated: Sequence[Component], scene: sp.Scene, path: Path) -> 
 
 def _build_controller(
     stated: Component,
-    scene: sp.Scene,
+    scene: Scene,
     q0: Array,
     shells: Mapping[str, controllers.ShellPlace],
     path: Path,

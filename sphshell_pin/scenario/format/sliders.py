@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 
-import sphshell_pin as sp
 from sphshell_pin.base.named_numbers import with_value
 from sphshell_pin.base.parameters import Component, Parameter, parameters_of
+from sphshell_pin.dynamics.run.simulation import Simulation
+from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.errors import InvalidParameter, ScenarioError
 from sphshell_pin.scenario.format.reading import Found, child_of, look_up, owner_of, parse_value
 from sphshell_pin.scenario.format.schema import ContactSection, KnobSection, Scenario, SourceSection
@@ -47,7 +48,7 @@ def with_numbers(built: Built, changes: Mapping[str, str]) -> Built | None:
     except InvalidParameter:
         return None
     scene = built.scene.with_pairs(tuple(pairs))
-    simulation = sp.Simulation(scene, built.simulation.integrator, built.simulation.sensors)
+    simulation = Simulation(scene, built.simulation.integrator, built.simulation.sensors)
     return replace(built, scenario=scenario, scene=scene, simulation=simulation)
 
 
@@ -97,11 +98,11 @@ def _changed_entry(entry: Entry, parts: Mapping[str, Mapping[str, float]]) -> En
 
 
 def _changed_pair(
-    pair: sp.results.ContactPair,
+    pair: ContactPair,
     entry: Entry,
     built: Built,
     parts: Mapping[str, Mapping[str, float]],
-) -> sp.results.ContactPair:
+) -> ContactPair:
     if "sphere" in parts:
         pair = with_value(pair, ("side_i", "sphere", "radius"), parts["sphere"]["radius"])
     new = {

@@ -22,9 +22,9 @@ PAIR_FIGURES = {
     "mean_force": "N",
     "max_depth": "m",
     "max_depth_time": "s",
+    "impulse": "N s",
+    "peak_force_time": "s",
 }
-PAIR_UNITS = {"impulse": "N s", "peak_force_time": "s"} | PAIR_FIGURES
-"""Units of all figures of a pair in `RunStats`."""
 JOINT_FIGURES = {
     "stop_time": "s",
     "stops": "",
@@ -45,9 +45,10 @@ RUN_FIGURES = {
     "stats.real_time_factor": "",
     "stats.steps": "",
     "stats.duration": "s",
+    "stats.rejected": "",
+    "stats.evaluations": "",
+    "stats.dt": "s",
 }
-MORE_STATS = {"stats.rejected": "", "stats.evaluations": "", "stats.dt": "s"}
-"""Figures of the integrator, for sweeps and comparisons."""
 NOT_REPEATABLE = ("stats.real_time_factor",)
 """Figures that are no property of the motion: they differ from one time to the next."""
 
@@ -62,33 +63,23 @@ class Verdict:
     met: bool
 
 
-def figure_names(built: Built) -> list[str]:
-    """Return every figure that a run of this scenario can be measured by."""
-    names = [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in PAIR_FIGURES]
-    joints = built.scene.joints
-    watched = dict.fromkeys((*joints.limits, *joints.effort, *joints.speed))
-    names += [f"joints.{name}.{one}" for name in watched for one in JOINT_FIGURES]
-    for sensor in built.simulation.sensors:
-        names += _sensor_units(sensor.name, sensor.columns(built.scene))
-    names += RUN_FIGURES
-    names += [f"figures.{name}" for name in built.figures]
-    final = [title for titles in coordinates(built.scene.model) for title in titles]
-    return names + [f"final.{quantity_of(title)[0]}" for title in final]
-
-
 def figure_units(built: Built) -> dict[str, str]:
-    """Return the units of the figures that are known to have one, by their names."""
-    model = built.scene.model
-    units = dict(RUN_FIGURES)
+    """Return the units of all figures that a run of this scenario can be measured by, by name.
+
+    Those without a unit, and those of the scenario's own routines, have an empty one.
+    """
+    model, joints = built.scene.model, built.scene.joints
+    units = dict[str, str]()
     for pair in built.scene.pairs:
-        units |= {f"pairs.{pair.name}.{one}": unit for one, unit in PAIR_UNITS.items()}
-    for name in list(model.names)[1:]:
+        units |= {f"pairs.{pair.name}.{one}": unit for one, unit in PAIR_FIGURES.items()}
+    for name in dict.fromkeys((*joints.limits, *joints.effort, *joints.speed)):
         units |= {f"joints.{name}.{one}": unit for one, unit in _joint_units(name, model).items()}
     for sensor in built.simulation.sensors:
         units |= _sensor_units(sensor.name, sensor.columns(built.scene))
+    units |= RUN_FIGURES | {f"figures.{name}": "" for name in built.figures}
     for titles in coordinates(model):
         units |= {f"final.{name}": unit for name, unit in map(quantity_of, titles)}
-    return {name: unit for name, unit in units.items() if unit not in ("", "1")}
+    return units
 
 
 def _joint_units(name: str, model: pin.Model | None) -> dict[str, str]:
@@ -116,7 +107,7 @@ def check_expectations(built: Built) -> None:
     ScenarioError
         It names the unknown figure, and those that come nearest.
     """
-    valid = figure_names(built)
+    valid = list(figure_units(built))
     for name in built.scenario.expect:
         if name not in valid:
             near = difflib.get_close_matches(name, valid, n=5, cutoff=0.3) or valid[:10]
@@ -138,7 +129,7 @@ def recorded_figures(
     stats, model = result.stats, None if scene is None else scene.model
     found: dict[str, tuple[float, str]] = {}
     for name, pair in stats.pairs.items():
-        for one, unit in PAIR_UNITS.items():
+        for one, unit in PAIR_FIGURES.items():
             found[f"pairs.{name}.{one}"] = getattr(pair, one), unit
     for name, joint in stats.joints.items():
         for one, unit in _joint_units(name, model).items():
@@ -150,7 +141,7 @@ def recorded_figures(
             units = _sensor_units(name, [title])
             found |= zip(units, zip(ways, units.values(), strict=True), strict=True)
     energy = measure_energy(result)
-    for name, unit in (RUN_FIGURES | MORE_STATS).items():
+    for name, unit in RUN_FIGURES.items():
         kind, _, one = name.partition(".")
         found[name] = energy[one] if kind == "energy" else getattr(stats, one), unit
     for titles, state in zip(state_titles(result, scene), (result.q, result.v), strict=True):

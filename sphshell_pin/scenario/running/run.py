@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin import errors
+from sphshell_pin._versions import __version__
 from sphshell_pin.base.atomic.files import held_folder
 from sphshell_pin.base.regular_file import open_regular, read_text
 from sphshell_pin.base.tables import csv_text
@@ -285,10 +286,8 @@ def versions() -> dict[str, str]:
     import coal
     import pinocchio as pin
 
-    import sphshell_pin
-
     return {
-        "sphshell_pin": sphshell_pin.__version__,
+        "sphshell_pin": __version__,
         "pinocchio": pin.__version__,
         "coal": coal.__version__,
         "numpy": np.__version__,

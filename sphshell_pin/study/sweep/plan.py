@@ -17,17 +17,10 @@ from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario,
 from sphshell_pin.scenario.format.build import build_scenario
 from sphshell_pin.scenario.format.reading import change_scenario, full_name, look_up
 from sphshell_pin.scenario.format.sliders import check_knobs, meaning
-from sphshell_pin.scenario.running.figures import (
-    MORE_STATS,
-    NOT_REPEATABLE,
-    check_expectations,
-    figure_names,
-    figure_units,
-)
+from sphshell_pin.scenario.running.figures import NOT_REPEATABLE, check_expectations, figure_units
 from sphshell_pin.scenario.running.run import versions
 from sphshell_pin.study.sweep.points import HOW, Dist, Points, Vary, grid_of, sample_of
 
-_MORE_OF_PAIR = ("impulse", "peak_force_time")
 Changes = Mapping[str, str]
 """Values of one run by dotted key."""
 
@@ -112,7 +105,7 @@ def plan_sweep(
     job = Job(name, fixed, probe, uses, digest([str(path.absolute()), digests]))
     # The unit of a key may follow another one that varies.
     ends = [changed(fixed, run, path) for run in (runs[0], runs[-1])]
-    units = dict(figure_units(built))
+    units = {name: unit for name, unit in figure_units(built).items() if unit not in ("", "1")}
     for key in points.values:
         unit, other = (_unit(one, key, path) for one in ends)
         if unit and unit == other:
@@ -122,9 +115,8 @@ def plan_sweep(
 
 def sweep_figures(built: Built) -> list[str]:
     """Return the names of the figures that a row of a sweep has: all that repeat bit for bit."""
-    names = [name for name in figure_names(built) if name not in NOT_REPEATABLE]
-    names += [f"pairs.{pair.name}.{one}" for pair in built.scene.pairs for one in _MORE_OF_PAIR]
-    return [*names, *MORE_STATS, *(f"met.{name}" for name in judged(built.scenario))]
+    names = [name for name in figure_units(built) if name not in NOT_REPEATABLE]
+    return names + [f"met.{name}" for name in judged(built.scenario)]
 
 
 def judged(scenario: Scenario) -> list[str]:

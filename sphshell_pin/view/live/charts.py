@@ -1,4 +1,4 @@
-"""The curves of the page's charts: of this run, and of earlier ones to compare it with."""
+"""The curves of the page's charts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ Point = list[float]
 
 MOST_KEPT = 40_000  # rows of a run in memory: at 5 ms, those of 200 s
 MOST_PIECES = 100  # in which they are: joining copies all
-MOST_POINTS = 4_000  # of an earlier run as a curve
 
 
 class History:
@@ -49,12 +48,6 @@ class History:
         rows = self._pieces[0].joined(self._pieces).select(slice(-MOST_KEPT, None))
         self._pieces = [rows]
         return rows
-
-    def copy(self) -> History:
-        """Return a history of the same rows."""
-        other = History()
-        other._pieces = list(self._pieces)
-        return other
 
 
 class Thinner:
@@ -110,8 +103,7 @@ class Thinner:
 class Charts:
     """What the browsers' charts show of `player`: only what one of them asks for is computed.
 
-    Used by one thread. `keys` are the curves that are sent, `earlier` the runs to compare with:
-    "last", the one before, and "kept", the one that a browser kept.
+    Used by one thread. `keys` are the curves that are sent.
     """
 
     def __init__(self, player: Player) -> None:
@@ -122,7 +114,6 @@ class Charts:
             one.key: one for one in own or force_series([pair.name for pair in player.scene.pairs])
         }
         self.keys: tuple[str, ...] = ()
-        self.earlier: dict[str, History] = {}
         self._asked: dict[object, tuple[str, ...]] = {}
         self._history = History()
         self._thinner = Thinner()
@@ -176,26 +167,6 @@ class Charts:
         """Forget the rows of the run, as where it goes on at another time."""
         self._history = History()
         self._thinner.clear()
-
-    def start_anew(self) -> None:
-        """Begin another run, and keep the one so far as the last one, if it went on at all."""
-        if self._history.since(-math.inf) is not None:
-            self.earlier["last"] = self._history
-        self.clear()
-
-    def keep(self) -> None:
-        """Keep the run so far to compare with, whatever follows."""
-        self.earlier["kept"] = self._history.copy()
-
-    def points(self, name: str, spacing: float) -> list[Point]:
-        """Return the curves of an earlier run, at least `spacing` [s] apart."""
-        rows = self.earlier[name].since(-math.inf)
-        if rows is None:
-            return []
-        length = float(rows.t[-1] - rows.t[0])
-        thinner = Thinner()
-        points = thinner.add(rows.t, self._values(rows), max(spacing, length / MOST_POINTS))
-        return points + thinner.end()
 
     def _values(self, rows: Rows) -> Array:
         values = np.empty((len(rows), len(self.keys)))

@@ -96,14 +96,12 @@ FIELDS: dict[str, _Fields] = {
     "speed": {"value": _not_negative},
     "parameter": {"key": _text, "value": _number_or_word},
     "push": {"body": _text, "direction": _direction, "newtons": _number, "seconds": _not_negative},
-    "hold": {"body": _text, "direction": _direction, "newtons": _number},
     "drag": {"node": _text, "point": _point, "target": _point, "stiffness": _positive},
     "release": {},
     "target": {"joint": _text, "value": _number},
     "show": {"part": _text, "on": _switch},
     "arrows": {"value": _not_negative},
     "charts": {"keys": _keys},
-    "keep": {},
     "seen": {"frame": _number},
 }
 """The fields of each kind of event, and the check of each value."""

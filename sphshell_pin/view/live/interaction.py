@@ -36,7 +36,6 @@ class Interaction:
         self._picture = picture
         self._window = window
         self._dragger: Client | None = None
-        self._holds: dict[Client, Event] = {}
         self._pushed: tuple[str, Array, float] | None = None  # until a time [s]
 
     @property
@@ -92,34 +91,20 @@ class Interaction:
         """Push or drag a body, or move the target of a joint."""
         match event["type"]:
             case "push":
-                self._push(event, event["seconds"])
-            case "hold":
-                self._check_body(event["body"])
-                self._holds[client] = event
+                self._push(event)
             case "target":
                 self._able().aim(event["joint"], event["value"])
             case "drag":
                 self._pull(self._able(), client, event)
 
-    def push_on(self, seconds: float) -> None:
-        """Push for `seconds` [s] more what is held; a drag takes the place of pushes."""
-        if self._dragger is None:
-            for event in self._holds.values():
-                self._push(event, seconds)
-
-    def _push(self, event: Event, seconds: float) -> None:
-        player = self._player
-        self._check_body(event["body"])
+    def _push(self, event: Event) -> None:
+        player, body = self._player, event["body"]
+        if body not in player.bodies:
+            raise NameNotFound("body to push", body, "this run", player.bodies)
         force = event["newtons"] * np.array(event["direction"])
-        player.push(event["body"], force, seconds)
+        player.push(body, force, event["seconds"])
         self._dragger = None
-        if force.any():
-            self._pushed = event["body"], force, player.time + seconds
-
-    def _check_body(self, body: str) -> None:
-        bodies = self._player.bodies
-        if body not in bodies:
-            raise NameNotFound("body to push", body, "this run", bodies)
+        self._pushed = (body, force, player.time + event["seconds"]) if force.any() else None
 
     def _able(self) -> Interactive:
         if self._interactive is None:
@@ -143,8 +128,7 @@ class Interaction:
         self._dragger, self._pushed = client, None
 
     def release(self, client: Client) -> None:
-        """End the drag of a browser, and the push that it holds."""
-        self._holds.pop(client, None)
+        """End the drag of a browser."""
         if self._interactive is not None and self._dragger is client:
             self._dragger = None
             self._interactive.release()

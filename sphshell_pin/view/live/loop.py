@@ -223,7 +223,6 @@ class Live:
 
     def _advance(self, duration: float, wall: float) -> None:
         player = self.player
-        self._interaction.push_on(1.5 * duration)
         before = player.time
         try:
             rows = player.advance(duration, wall)
@@ -267,7 +266,7 @@ class Live:
                 self._pace.clear()
             case "parameter":
                 self._change(event["key"], event["value"])
-            case "push" | "hold" | "drag" | "target":
+            case "push" | "drag" | "target":
                 self._interaction.do(client, event)
             case "release":
                 self._interaction.release(client)
@@ -284,9 +283,6 @@ class Live:
             case "charts":
                 if self._charts.ask(client, event["keys"]):
                     self._send_curves()
-            case "keep":
-                self._charts.keep()
-                self._post_earlier("kept")
 
     def _change(self, key: str, value: float | str) -> None:
         labels = {one.key: one.label for one in self.player.parameters}
@@ -324,16 +320,10 @@ class Live:
         self.fault = None
         self._interaction.forget()
         self._ahead = 0.0
-        self._charts.start_anew()
-        if "last" in self._charts.earlier:
-            self._post_earlier("last")
-        self._clear_charts()
-        self.picture.clear()
-
-    def _clear_charts(self) -> None:
         self._charts.clear()
         self._points, self._clear_points = [], True
         self._pace.clear()
+        self.picture.clear()
 
     def _send_curves(self) -> None:
         """Send the curves that are shown now, from the rows that are there."""
@@ -342,14 +332,6 @@ class Live:
             ask(self._charts.sources)
         since = self.player.time - panel.STRIP_SECONDS * self.speed
         self._points, self._clear_points = self._charts.again(since, self._spacing), True
-        for name in self._charts.earlier:
-            self._post_earlier(name)
-
-    def _post_earlier(self, name: str) -> None:
-        points = self._charts.points(name, self._spacing)
-        self._panel.post(
-            name, {"type": "earlier", "name": name, "keys": self._charts.keys, "rows": points}
-        )
 
     # The panel
 

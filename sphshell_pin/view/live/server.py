@@ -142,7 +142,7 @@ class Server:
         self.arrived.set()
 
     def leave(self, client: Client) -> None:
-        """Forget a browser that has gone, and end the push that it held."""
+        """Forget a browser that has gone, and end what it drags."""
         self.clients.discard(client)
         self._events.append((client, {"type": "release"}))
         self.arrived.set()

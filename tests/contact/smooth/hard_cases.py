@@ -65,11 +65,6 @@ def graph(height, slopes, half: float, cells: int):
     return np.stack([x, y, height(x, y)], axis=1), elements, normals
 
 
-def given(mesh, **options) -> Shell:
-    """Shell with the normals that came with a mesh."""
-    return Shell(mesh[0], mesh[1], normals=mesh[2], **options)
-
-
 FILES = ("rounds", "sheets", "meshes")
 
 

@@ -170,6 +170,11 @@ def can(columns: int = 40, rows: int = 4):
     return vertices, triangles[:, ::-1].copy(), normals[:, ::-1].copy()
 
 
+def given(mesh, **options) -> Shell:
+    """Shell with the normals that came with a mesh."""
+    return Shell(mesh[0], mesh[1], normals=mesh[2], **options)
+
+
 SURFACES = {
     "bowl": Smooth(ball_mesh, ball_points, -1.0),
     "dome": Smooth(ball_mesh, ball_points),

@@ -1,12 +1,13 @@
 """Sweeps of a sphere of radius one over every kind of joint, and what must not jump along them."""
 
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from tests.contact.helpers import energy, force_sum
-from tests.contact.smooth.test_potential import crossing, query
-from tests.contact.walks import steepest
+from tests.contact.smooth.test_potential import query
+from tests.contact.walks import borders, steepest
 from tests.oracle.pieces import potential_and_force
 
 DEPTHS = (0.04, 0.004, 0.0004)
@@ -29,19 +30,12 @@ def about(axis, center, angles):
     return along + np.outer(np.cos(angles), east) + np.outer(np.sin(angles), np.cross(axis, east))
 
 
-def borders(shell, start, end, width: float = WIDTH):
-    """All places between two centres where the contacts' features change: pairs of centres."""
-    found = []
-    while len(found) < 60 and (pair := crossing(shell, start, end, width)) is not None:
-        found.append(pair)
-        start = pair[1]
-    return found
-
-
 def sweep(shell, path):
     """Pairs of centres WIDTH apart where the force may jump: wherever the features change, and,
     lest it jump where they do not, in the step of the path over which it changes most."""
-    pairs = [pair for ends in pairwise(path) for pair in borders(shell, *ends)]
+    pairs = [
+        pair for ends in pairwise(path) for pair in borders(partial(query, shell), *ends, WIDTH)
+    ]
 
     def force(center):
         return force_sum(query(shell, center))

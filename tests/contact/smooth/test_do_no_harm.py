@@ -18,9 +18,8 @@ from tests.contact.smooth.parts import (
     fillet,
     random_extruded,
     random_turned,
-    turned,
 )
-from tests.contact.smooth.surfaces import SURFACES, mean_edge, shell_of
+from tests.contact.smooth.surfaces import SURFACES, mean_edge
 
 COUNT = 50  # of each family
 
@@ -34,17 +33,6 @@ def test_random_parts(make, averaged: bool) -> None:
     normals = [averaged_normals(p.vertices, p.elements) if averaged else None for p in parts]
     worse = [seed for seed in range(COUNT) if parts[seed].is_worse_than_flat(normals[seed])]
     assert len(worse) <= 0.02 * COUNT, worse
-
-
-@pytest.mark.parametrize("sides", [16, 32, 48])
-@pytest.mark.parametrize("length", [5.0, 20.0])
-def test_shaft_with_a_cone(sides: int, length: float) -> None:
-    """Off the cylinder by less than the flat triangles are, whatever the cone's angle."""
-    rng = np.random.default_rng(0)
-    for lean in (5, 10, 15, 20, 28):
-        profile = np.array([[1, 0], [1, length], [1 + 2 * np.tan(np.radians(lean)), length + 2]])
-        curved, flat = turned(profile, sides, rng).errors()
-        assert curved <= flat, (lean, curved, flat)
 
 
 def fillet_part(chords: int, turn: float, wall: float, rows: int) -> Part:
@@ -128,14 +116,6 @@ def test_coarse_spheres_with_good_normals_stay_curved(level: int) -> None:
     places = 1.3 * directions(rng, 500)
     off = np.abs(shell.closest_points(places).distances - 0.3).max()
     assert off <= (0.03, 1.5e-3, 1e-4)[level]
-
-
-@pytest.mark.parametrize("name", sorted(SURFACES))
-@pytest.mark.parametrize("exact", [True, False])
-def test_no_creases_on_smooth_surfaces(name: str, exact: bool) -> None:
-    """Jittered vertices and random diagonals, at sides of 0.3: next to nothing is set aside."""
-    core = shell_of(name, 0.3, exact).core_for("smooth")
-    assert core.normals_set_aside.mean() <= 1e-3
 
 
 def test_noise_above_the_curvature_stays_flat() -> None:

@@ -7,7 +7,7 @@ from sphshell_pin import ImpactLaw, Shell
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell.contact_set import Feature
 from tests import meshes
-from tests.contact.smooth.surfaces import SURFACES, can, shell_of
+from tests.contact.smooth.surfaces import SURFACES, can, given, shell_of
 
 LAW = ImpactLaw(2.0, exponent=1.5)
 
@@ -73,8 +73,7 @@ def test_round_a_cube(method: str) -> None:
 
 
 def test_at_curved_edges() -> None:
-    vertices, triangles, normals = can()
-    shell = Shell(vertices, triangles, normals=normals)
+    shell = given(can())
     turn, tilt = np.random.default_rng(2).uniform([0, 0.1], [2 * np.pi, 1.5], (60, 2)).T
     out = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
     normal = np.sin(tilt)[:, None] * out + np.cos(tilt)[:, None] * [0, 0, 1]
@@ -90,9 +89,8 @@ def test_at_a_saddle() -> None:
 
 def test_pushed_back_through() -> None:
     """The centre behind a one-sided shell: the force leads out, and grows with the way out."""
-    vertices, elements, normals = SURFACES["dome"].mesh(0.6)
-    shell = Shell(vertices, elements, normals=normals, side="outside")
     points, outward = SURFACES["dome"].points(np.random.default_rng(4), 30)
+    shell = given(SURFACES["dome"].mesh(0.6), side="outside")
     assert_gradient(shell, points - 0.1 * outward, 1.0)
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from sphshell_pin import Shell
-from sphshell_pin.base.arrays import Array
 from tests import meshes
 from tests.contact.helpers import energy, force_sum
-from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, given, push
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, push
+from tests.contact.smooth.surfaces import given
 from tests.oracle.pieces import potential_and_force
 
 
@@ -21,11 +21,16 @@ def test_straight_over_an_edge(reach: float) -> None:
         assert energy(find(shell, center)) == pytest.approx(exact, rel=1e-5)
 
 
+def with_another(mesh: meshes.Mesh, vertices: np.ndarray) -> Shell:
+    """A sheet, and the same with other vertices."""
+    elements = np.concatenate([mesh[1], mesh[1] + len(vertices)])
+    return Shell(np.concatenate([mesh[0], vertices]), elements)
+
+
 def test_parallel_sheets() -> None:
     """Two sheets closer than 2 r; two contacts that push against each other, exact."""
-    vertices, elements = meshes.random_plate(200, size=6.0, slivers=False)
-    both = np.concatenate([vertices, vertices + 1.5 * UP])
-    shell = Shell(both, np.concatenate([elements, elements + len(vertices)]))
+    plate = meshes.random_plate(200, size=6.0, slivers=False)
+    shell = with_another(plate, plate[0] + 1.5 * UP)
     for z in np.linspace(0.51, 0.99, 25):
         found = find(shell, [0.1, 0.2, z])
         assert sorted(found.depth) == pytest.approx(sorted([1 - z, z - 0.5]), abs=1e-12)
@@ -38,12 +43,11 @@ def test_parallel_sheets() -> None:
 def test_flat_tube() -> None:
     """Both walls of a flat tube, one smooth patch, closer than 2 r; each has its contact."""
     turn = 2 * np.pi * np.arange(48) / 48
-    across = np.stack([3 * np.cos(turn), np.zeros(48), 0.45 * np.sin(turn)], axis=1)
-    out = np.stack([0.45 * np.cos(turn), np.zeros(48), 3 * np.sin(turn)], axis=1)
+    across = np.stack([3 * np.cos(turn), 0 * turn, 0.45 * np.sin(turn)], axis=1)
+    out = np.stack([0.45 * np.cos(turn), 0 * turn, 3 * np.sin(turn)], axis=1)
     out /= np.linalg.norm(out, axis=1)[:, None]
-    rows = np.array([[0.0, y, 0.0] for y in np.linspace(-2, 2, 9)])
-    vertices = (rows[:, None, :] + across).reshape(-1, 3)
-    first = (np.arange(8)[:, None] * 48 + np.arange(48)).ravel()
+    vertices = np.concatenate([across + [0.0, y, 0.0] for y in np.linspace(-2, 2, 9)])
+    first = np.arange(8 * 48)
     second = first // 48 * 48 + (first + 1) % 48
     elements = np.stack([first, second, second + 48, first + 48], axis=1)
     shell = Shell(vertices, elements, normals=np.tile(-out, (9, 1)), crease_angle=1.5)
@@ -53,9 +57,8 @@ def test_flat_tube() -> None:
         exact = [0.55 - z, 0.55 + z]
         assert sorted(found.depth[found.weight > 0]) == pytest.approx(sorted(exact), abs=2e-3)
         size = max(exact) ** 1.5
-        assert force_sum(found)[2] / size == pytest.approx(
-            (exact[1] ** 1.5 - exact[0] ** 1.5) / size, abs=0.01
-        )
+        force = exact[1] ** 1.5 - exact[0] ** 1.5
+        assert force_sum(found)[2] == pytest.approx(force, abs=0.01 * size)
 
 
 def test_crossing_sheets() -> None:
@@ -64,9 +67,7 @@ def test_crossing_sheets() -> None:
     lean = np.array([[0.6, 0.0, -0.8], [0.0, 1.0, 0.0], [0.8, 0.0, 0.6]])
     other = vertices @ lean.T + [0.0, 0.013, 0.0]
     alone = [Shell(vertices, elements), Shell(other, elements)]
-    both = Shell(
-        np.concatenate([vertices, other]), np.concatenate([elements, elements + len(vertices)])
-    )
+    both = with_another((vertices, elements), other)
     for center in np.random.default_rng(0).uniform(-1, 1, (300, 3)):
         sums = sum(force_sum(find(shell, center)) for shell in alone)
         assert np.abs(force_sum(find(both, center)) - sums).max() <= 1e-12
@@ -75,11 +76,8 @@ def test_crossing_sheets() -> None:
 @fails("only facets drop what another sheet covers: beside the border the force doubles")
 def test_overlapping_sheets() -> None:
     """Two sheets in one plane, one partly over the other; one contact, as with a single plate."""
-    vertices, elements = meshes.grid_plate(3, 3, 4.0)
-    shell = Shell(
-        np.concatenate([vertices, vertices + [1.7, 0.3, 0.0]]),
-        np.concatenate([elements, elements + len(vertices)]),
-    )
+    plate = meshes.grid_plate(3, 3, 4.0)
+    shell = with_another(plate, plate[0] + [1.7, 0.3, 0.0])
     for x in np.linspace(-1.0, 2.7, 75):
         assert push(shell, [x, 0.2, 1 - DEPTH]) == pytest.approx(UP, abs=1e-9)
 
@@ -127,35 +125,3 @@ def test_fold_of_exactly_the_crease_angle(sign: float) -> None:
         center = [x, y, abs(x) * np.tan(0.15) + sign * (1 - DEPTH)]
         forces = [push(shell, center) for shell in shells]
         assert np.ptp(forces, axis=0).max() <= 1e-9
-
-
-def moebius(steps: int = 48) -> Shell:
-    """Strip of half-width 1, turned over once along a circle of radius 3."""
-    vertices, across = [], np.linspace(-1.0, 1.0, 5)
-    for turn in 2 * np.pi * np.arange(steps) / steps:
-        middle, along = along_strip(turn)[0], np.array([np.cos(turn), np.sin(turn), 0.0])
-        wide = np.cos(turn / 2) * along + np.sin(turn / 2) * UP
-        vertices += [middle + s * wide for s in across]
-    cells = [[5 * i + j, 5 * i + j + 1, 5 * i + j + 6, 5 * i + j + 5]
-             for i in range(steps - 1) for j in range(4)]  # fmt: skip
-    last = 5 * (steps - 1)
-    cells += [[last + j, last + j + 1, 3 - j, 4 - j] for j in range(4)]
-    return Shell(np.array(vertices), cells)
-
-
-def along_strip(turn: float) -> tuple[Array, Array]:
-    """Place on the middle of the strip, and its normal there, that of the other side a turn on."""
-    out, along = np.array([np.cos(turn), np.sin(turn), 0.0]), [-np.sin(turn), np.cos(turn), 0.0]
-    return 3 * out, np.cross(along, np.cos(turn / 2) * out + np.sin(turn / 2) * UP)
-
-
-def test_moebius_strip() -> None:
-    """Moebius strip, sphere r = 0.3 twice round it; reported, pushed away as by one."""
-    shell = moebius()
-    assert shell.health.one_sided_components == 1
-    for turn in np.linspace(0, 4 * np.pi, 2001):
-        place, normal = along_strip(turn)
-        found = find(shell, place + 0.25 * normal, 0.3)
-        assert len(found)
-        assert (found.normal @ normal).min() > 0.999
-        assert force_sum(found) @ normal / 0.05**1.5 == pytest.approx(1.0, abs=0.01)

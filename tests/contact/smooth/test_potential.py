@@ -1,34 +1,19 @@
 """The normal force has a potential, and there is one contact however near a border is."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import SURFACES, shell_of
-from tests.contact.walks import narrowed
+from tests.contact.walks import borders, label
 
 CURVED = ("bowl", "dome", "torus inside", "wavy above", "wavy below")
 
 
 def query(shell, center):
     return shell.contacts(center, 1.0, method="smooth")
-
-
-def label(contacts):
-    """What the contacts are with: a change of it is the passing of some border."""
-    terms = contacts.terms
-    rows = zip(terms.element, terms.feature, terms.weight, strict=True)
-    return sorted((int(e), int(f), float(w)) for e, f, w in rows)
-
-
-def crossing(shell, start, end, width: float):
-    """Centres `width` apart, between `start` and `end`, whose contacts differ; None if none do."""
-
-    def look(center):
-        return label(query(shell, center))
-
-    *pair, first, last = narrowed(look, start, end, width, lambda a, b, _: a != b)
-    return None if first == last else pair
 
 
 def crossings(name: str, h: float, depth: float, count: int, width: float, seed: int = 0):
@@ -39,9 +24,8 @@ def crossings(name: str, h: float, depth: float, count: int, width: float, seed:
     found = []
     for center, normal in zip(centers, normals, strict=True):
         along = np.cross(normal, rng.normal(size=3))
-        pair = crossing(shell, center, center + 0.5 * h * along / np.linalg.norm(along), width)
-        if pair is not None:
-            found.append(pair)
+        end = center + 0.5 * h * along / np.linalg.norm(along)
+        found += borders(partial(query, shell), center, end, width)[:1]
         if len(found) == count:
             break
     assert len(found) > count // 2

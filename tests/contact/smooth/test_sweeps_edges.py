@@ -224,15 +224,3 @@ def test_vertices_that_count_as_smooth(kind: str, facets: int, slope: float) -> 
             pairs = sweeps.sweep(shell, path)
             change = sweeps.changes(shell, pairs, depth)[:, 1 if kind == "pit" else 0]
             assert change.max() <= sweeps.LIMIT, (change.max(), pairs[change.argmax()][0].tolist())
-
-
-def test_corner_of_a_box() -> None:
-    """Three walls at right angles, touched one, two and three at a time."""
-    shell = edged("box")
-    rng = np.random.default_rng(6)
-    for depth in sweeps.DEPTHS:
-        corner = 2.0 - (1 - depth) * np.ones(3)
-        along = 0.02 * directions(rng, 6)
-        paths = [sweeps.segment(corner - d, corner + 0.8 * d, 9) for d in along]
-        sweeps.assert_continuous(shell, paths, depth)
-        sweeps.assert_as_defined(shell, [c for path in paths for c in path[:4]], depth)

@@ -15,6 +15,7 @@ const AT_FIRST = 8;
 const chart = new Chart(element("chart"));
 const quantities = new Map(); // "Force [N]": { name, unit, series, chosen: keys }
 const earlier = { last: null, kept: null }; // runs to compare with
+let before = null; // the rows up to the last time they were cleared
 let shown = null, span = 6;
 
 on("hello", (data) => {
@@ -119,14 +120,13 @@ function compare() {
   chart.draw();
 }
 
-on("earlier", ({ name, keys, rows }) => {
-  earlier[name] = rows.length ? { keys, rows } : null;
-  compare();
-});
-
 on("rows", ({ keys, rows, clear }) => {
   const { run } = chart;
-  if (clear) { run.rows = []; chart.forget_scale(); }
+  if (clear) {
+    before = { keys: run.keys, rows: run.rows };
+    run.rows = [];
+    chart.forget_scale();
+  }
   run.keys = keys;
   for (const row of rows) {
     // A run that started anew has an earlier time: what was later is gone.
@@ -137,6 +137,10 @@ on("rows", ({ keys, rows, clear }) => {
 });
 
 on("state", (data) => {
+  if (data.t < chart.now && before?.rows.length) { // it started anew
+    earlier.last = before;
+    compare();
+  }
   chart.now = data.t;
   chart.span = span * data.speed;
   chart.draw();
@@ -149,8 +153,9 @@ element("compare").onchange = compare;
 
 const keep = () => {
   if (element("keep").hidden) return;
-  send({ type: "keep" });
+  earlier.kept = { keys: chart.run.keys, rows: [...chart.run.rows] };
   element("compare").value = "kept";
+  compare();
 };
 element("keep").onclick = keep;
 add_key({ keys: ["k"], says: "keep this run to compare with", act: keep });

@@ -4,7 +4,7 @@
 const listeners = new Map();
 
 // Calls `act` with each message of a kind. Of the server: "hello" (once), "state", "rows",
-// "earlier", "error"; of this page: "joined" (each connection), "frame", "picture", "theme", "lost".
+// "error"; of this page: "joined" (each connection), "frame", "picture", "theme", "lost".
 export function on(kind, act) {
   if (!listeners.has(kind)) listeners.set(kind, []);
   listeners.get(kind).push(act);

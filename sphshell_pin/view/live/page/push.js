@@ -6,9 +6,11 @@ import { element, fill, Slider } from "./controls.js";
 import { add_key } from "./keys.js";
 
 const AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
-let picture = null, bodies = [];
+const HELD = 0.3; // [s of the clock] that a held push outlasts the last message
+let picture = null, bodies = [], speed = 1;
 
 on("picture", (one) => { picture = one; });
+on("state", (data) => { speed = data.speed; });
 on("hello", (data) => {
   bodies = data.bodies;
   fill(element("body"), bodies.map((name) => [name, name]));
@@ -42,12 +44,12 @@ function let_go() {
   clearInterval(held);
   held = null;
   hold.classList.remove("down");
-  send({ type: "release" });
+  send({ type: "push", ...force(), newtons: 0, seconds: 0 });
 }
 function press() {
   if (held !== null) return;
   hold.classList.add("down");
-  const again = () => send({ type: "hold", ...force() });
+  const again = () => send({ type: "push", ...force(), seconds: HELD * speed });
   again();
   held = setInterval(again, 100); // the direction follows the camera
 }
