@@ -7,6 +7,8 @@ import sphshell_pin as sp
 from sphshell_pin import robots
 
 WALL = ([[-0.1, -0.1, 0], [0.1, -0.1, 0], [0.1, 0.1, 0], [-0.1, 0.1, 0]], [[0, 1, 2, 3]])
+LAW = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
+FRICTION = sp.CoulombFriction(0.3, 0.25, 1e-3, 1e-2)
 
 
 def finger_run():
@@ -15,19 +17,11 @@ def finger_run():
     wall = sp.Shell(*WALL, name="wall")
     upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, -np.pi / 2, 0.0), np.array([0.07, 0.0, 0.1]))
     scene = sp.Scene(finger.model)
-    law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
-    friction = sp.CoulombFriction(0.3, 0.25, 1e-3, 1e-2)
-    scene.add_contact(
-        sp.Sphere(0.010, "tip"),
-        wall,
-        placement=upright,
-        law=law,
-        friction=friction,
-        name="tip-wall",
-    )
+    tip, placed = sp.Sphere(0.010, "tip"), {"placement": upright, "friction": FRICTION}
+    scene.add_contact(tip, wall, law=LAW, name="tip-wall", **placed)
     other = sp.Shell(*WALL, name="wall")
     away = pin.SE3(pin.rpy.rpyToMatrix(0.1, 0.2, 0.3), np.array([0.5, 0.0, -0.5]))
-    scene.add_contact(sp.Sphere(0.010, "tip"), other, placement=away, law=law, name="never-there")
+    scene.add_contact(tip, other, placement=away, law=LAW, name="never-there")
     sensors = [
         sp.ForceTorqueSensor(name="fingertip", frame="tip", rate=500, delay=2e-3),
         sp.JointTorqueSensor(name="knuckle", joint="knuckle", rate=500),
@@ -60,8 +54,8 @@ def turntable_run():
         sp.Shell(*WALL, name="disc"),
         frame="disc",
         placement=tilted.inverse(),
-        law=sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0),
-        friction=sp.CoulombFriction(0.3, 0.25, 1e-3, 1e-2),
+        law=LAW,
+        friction=FRICTION,
         name="1st ball/disc",
     )
     q0 = np.array([1.0, 0.0, 0.05, 0.01, 0.0201, 0.0, 0.0, 0.0, 1.0])
@@ -78,8 +72,7 @@ def linkless_run():
     model.appendBodyToJoint(turns, pin.Inertia.FromSphere(0.05, 0.02), pin.SE3.Identity())
     model.addBodyFrame("moves", turns, pin.SE3.Identity(), 0)  # the link is called as the joint
     scene = sp.Scene(model)
-    law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
-    scene.add_contact(sp.Sphere(0.02, "moves"), sp.Shell(*WALL), law=law, name="ball")
+    scene.add_contact(sp.Sphere(0.02, "moves"), sp.Shell(*WALL), law=LAW, name="ball")
     q0 = np.array([0.01, 0.02, 0.03, 0.0, 0.0, 0.0, 1.0])
     v0 = np.array([0.1, 0.2, 0.3, 1.0, 2.0, 3.0])
     return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(q0, v0, 0.01, record_dt=1e-3)

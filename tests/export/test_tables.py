@@ -11,28 +11,12 @@ from sphshell_pin.base.tables import column, csv_text, quantity_of
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.errors import MissingExtra, ResultError
 from sphshell_pin.export.tables import tables_of, write_tables
-from tests.export.runs import finger_run, turntable_run
-
-
-@pytest.fixture(scope="module")
-def finger():
-    return finger_run()
-
-
-@pytest.fixture(scope="module")
-def table():
-    return turntable_run()
 
 
 def read(folder, format):
-    def one(path):
-        if format == "parquet":
-            return pd.read_parquet(path)
-        return pd.read_csv(
-            path, float_precision="round_trip", keep_default_na=False, na_values=[""]
-        )
-
-    return {path.stem: one(path) for path in folder.iterdir()}
+    exact = {"float_precision": "round_trip", "keep_default_na": False, "na_values": [""]}
+    one, options = (pd.read_parquet, {}) if format == "parquet" else (pd.read_csv, exact)
+    return {path.stem: one(path, **options) for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize("format", ["csv", "parquet"])
@@ -51,10 +35,7 @@ def test_every_number_is_read_back_exactly(run, format, request, tmp_path):
 
 def test_the_columns_of_the_rows_are_those_of_the_result(finger):
     rows = finger.row_columns()
-    assert list(rows)[:4] == [
-        "t [s]",
-        *(f"q.{name} [rad]" for name in finger.scene.model.names[1:]),
-    ]
+    assert list(rows)[:4] == ["t [s]", *(f"q.{n} [rad]" for n in finger.scene.model.names[1:])]
     for index in range(3):
         np.testing.assert_array_equal(list(rows.values())[1 + index], finger.q[:, index])
         np.testing.assert_array_equal(list(rows.values())[4 + index], finger.v[:, index])
@@ -64,10 +45,8 @@ def test_the_columns_of_the_rows_are_those_of_the_result(finger):
     at = np.searchsorted(log.row, one)
     force = np.column_stack([rows[f"pairs.tip-wall.force_{axis} [N]"] for axis in "xyz"])
     np.testing.assert_array_equal(force[one], log.force_world[at])
-    np.testing.assert_array_equal(
-        rows["pairs.tip-wall.normal_force [N]"][one], log.normal_force[at]
-    )
-    np.testing.assert_array_equal(rows["pairs.tip-wall.depth [m]"][one], log.depth[at])
+    for name, wanted in (("normal_force [N]", log.normal_force), ("depth [m]", log.depth)):
+        np.testing.assert_array_equal(rows[f"pairs.tip-wall.{name}"][one], wanted[at])
     free = np.setdiff1d(np.arange(len(finger.t)), log.row)
     assert not rows["pairs.tip-wall.depth [m]"][free].any()
     assert not rows["pairs.never-there.normal_force [N]"].any()
@@ -125,16 +104,10 @@ def test_names_of_columns_and_text():
     text = csv_text({"x [m]": [0.1, np.nan], "n": [1, 2], "name": ["a,b", 'c"d']})
     assert text.splitlines() == ["x [m],n,name", '0.1,1,"a,b"', ',2,"c""d"']
     # No spreadsheet evaluates a name; numbers stay numbers.
-    text = csv_text({"=1+1": ["@a", "+b", "-c", "\td", "\uff1df", "e=1"], "x": [-1.0] * 6})
-    assert [line.split(",")[0] for line in text.split("\r\n")][:-1] == [
-        "'=1+1",
-        "'@a",
-        "'+b",
-        "'-c",
-        "'\td",
-        "'\uff1df",
-        "e=1",
-    ]
+    names = ["@a", "+b", "-c", "\td", "\uff1df"]
+    text = csv_text({"=1+1": [*names, "e=1"], "x": [-1.0] * 6})
+    first = [line.split(",")[0] for line in text.split("\r\n")][:-1]
+    assert first == ["'=1+1", *(f"'{name}" for name in names), "e=1"]
     assert text.count(",-1.0") == 6
 
 

@@ -81,18 +81,11 @@ def test_the_scene_is_the_one_that_ran(built: Built, result: sp.Result, tmp_path
 @pytest.mark.parametrize("method", ["facets", "smooth", "elements"])
 @pytest.mark.parametrize("name", ["plate", "valve"])
 def test_surfaces_are_the_same_bits(built, result, name, method):
-    before, after = built.shells[name], None
-    for one in (one for pair in Replay(result).scene.pairs for one in pair.shells):
-        if one.shell.name == name:
-            after = one.shell
-    assert after is not None
-    assert (after.side, after.crease_angle, after.size) == (
-        before.side,
-        before.crease_angle,
-        before.size,
-    )
-    centers = np.random.default_rng(0).uniform(*before.box, (200, 3))
-    for center in centers:
+    sides = (one for pair in Replay(result).scene.pairs for one in pair.shells)
+    before, after = built.shells[name], next(one.shell for one in sides if one.shell.name == name)
+    for value in ("side", "crease_angle", "size"):
+        assert getattr(after, value) == getattr(before, value)
+    for center in np.random.default_rng(0).uniform(*before.box, (200, 3)):
         one, other = (shell.contacts(center, 0.02, method=method) for shell in (before, after))
         assert pickle.dumps(one) == pickle.dumps(other)
     assert len(before.faces) == len(after.faces)
@@ -111,9 +104,8 @@ def test_meshes_beyond_the_limit_are_named(result, monkeypatch):
     assert f"file.{digest}" in whole.arrays
     urdf = whole.contents["robots"][0]
     urdf["meshes"] = dict.fromkeys(urdf["meshes"], "0" * 64)  # of one that is not kept
-    with pytest.warns(
-        RobotWarning, match=r"which the results do not hold: .*package://finger.*cube"
-    ):
+    said = r"which the results do not hold: .*package://finger.*cube"
+    with pytest.warns(RobotWarning, match=said):
         Replay(with_kept(result, whole))
 
 
@@ -144,10 +136,7 @@ def part(name: str, value: object) -> Change:
 
 PLATE, VALVE = "shell.plate.", "shell.valve."
 WRONG: dict[str, tuple[Change, str]] = {
-    "include": (
-        in_text(2, "<asset>", '<include file="/etc/passwd"/><asset>'),
-        "it includes other files",
-    ),
+    "include": (in_text(2, "<asset>", '<include file="a"/><asset>'), "it includes other files"),
     "posture": (posture(0.0), r"its posture \[0\.0\] is not one of 2 numbers"),
     "no number": (posture(np.nan, 0.0), r"its posture \[nan, 0\.0\] is not one of 2 numbers"),
     "no robot": (part("robots", [None] * 3), "does not hold the robot 'arm/arm.urdf.xacro'"),
@@ -156,10 +145,7 @@ WRONG: dict[str, tuple[Change, str]] = {
     "urdf": (in_text(0, "</robot>", ""), "not well-formed XML"),
     "no surface": (lambda c, _: c["surfaces"].pop("plate"), "does not hold the surface 'plate'"),
     "no table": (part("tables", {}), "does not hold the file 'law.csv' of a law"),
-    "crease angle": (
-        lambda contents, _: contents["surfaces"]["plate"].update(crease_angle=-1.0),
-        "crease_angle",
-    ),
+    "crease angle": (lambda c, _: c["surfaces"]["plate"].update(crease_angle=-1.0), "crease_angle"),
     "index": (added(f"{PLATE}elements", 100), "element 0 uses vertex 100"),
     "triangle": (added(f"{PLATE}triangles", 7), "its triangles do not fit"),
     "face": (added(f"{VALVE}element_face", 999), "its element_face do not fit"),

@@ -10,6 +10,12 @@ from tests.oracle.hertz import hertz_contact
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider
 
 
+def pressing(shell, law=LAW):
+    scene = sp.Scene(slider())
+    scene.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=law, name="tip")
+    return sp.Simulation(scene)
+
+
 def test_a_ball_on_a_plane_has_the_patch_of_hertz():
     result = slide()
     patches, log = result.patches, result.contacts
@@ -27,9 +33,7 @@ def test_a_ball_on_a_plane_has_the_patch_of_hertz():
 
 
 def test_other_numbers_are_the_same_without_patches():
-    scene = sp.Scene(slider())
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, name="tip")
-    simulation, q0 = sp.Simulation(scene), [0.0, 0.0, RADIUS - pressed(20.0)]
+    simulation, q0 = pressing(plate()), [0.0, 0.0, RADIUS - pressed(20.0)]
     asked = simulation.run(q0, [0.1, 0, 0], 0.02, record=["patch"])
     not_asked = simulation.run(q0, [0.1, 0, 0], 0.02)
     assert np.array_equal(asked.q, not_asked.q)
@@ -39,16 +43,12 @@ def test_other_numbers_are_the_same_without_patches():
         not_asked.patches  # noqa: B018
 
 
-def test_files_keep_them(tmp_path):
+def test_files_keep_them_and_are_refused_with_too_few(tmp_path):
     result = slide()
     result.save(tmp_path / "run.npz")
     again = sp.Result.load(tmp_path / "run.npz")
     assert (again.patches == result.patches).all()
     assert again.contact_columns()["peak_pressure [Pa]"][7] == result.patches["peak_pressure"][7]
-
-
-def test_a_file_with_too_few_patches_is_refused(tmp_path):
-    slide().save(tmp_path / "run.npz")
     with np.load(tmp_path / "run.npz") as file:
         arrays = dict(file)
     arrays["patches.approach"] = arrays["patches.approach"][:-1]
@@ -58,9 +58,7 @@ def test_a_file_with_too_few_patches_is_refused(tmp_path):
 
 
 def test_open_runs_and_rollouts_record_them():
-    scene = sp.Scene(slider())
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), plate(), law=LAW, name="tip")
-    simulation, q0 = sp.Simulation(scene), [0.0, 0.0, RADIUS - pressed()]
+    simulation, q0 = pressing(plate()), [0.0, 0.0, RADIUS - pressed()]
     run = OpenRun(simulation, q0, record_dt=1e-3, record=("patch",))
     assert len(run.snapshot().patches) == 1
     assert len(run.advance(0.01).patches) == 11
@@ -100,11 +98,9 @@ def test_a_ball_on_a_cylinder_has_an_elliptical_patch(law):
         np.stack([corner, corner + 5, corner + 6, corner + 1], axis=1),
         normals=across,
     )
-    scene = sp.Scene(slider())
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), shell, law=law, name="tip")
     away = np.array([np.cos(0.2), np.sin(0.2), 0.0])
     q0 = (radius + RADIUS - 2e-4) * away + np.array([0.0, 0.0, 3e-3])
-    result = sp.Simulation(scene).run(q0, duration=1e-5, record=("patch",))
+    result = pressing(shell, law).run(q0, duration=1e-5, record=("patch",))
     patch, log = result.patches[0], result.contacts
     _, a, b, _ = hertz_contact(0.5 / RADIUS, 0.5 / RADIUS + 0.5 / radius, 1.0, patch["approach"])
     # HertzLaw corrects what the elements leave of the cylinder.

@@ -56,12 +56,8 @@ def test_shares_are_those_of_the_pressure(slid):
     up /= np.linalg.norm(up)
     latitude = np.arcsin(place @ up)
     longitude = np.arctan2(place @ np.cross(up, axis), place @ axis)
-    expected = np.histogram2d(
-        latitude.ravel(),
-        longitude.ravel(),
-        [np.linspace(-0.15, 0.15, 6), np.linspace(-0.15, 0.15, 10)],
-        weights=load.ravel(),
-    )[0]
+    edges, places = [np.linspace(-0.15, 0.15, n) for n in (6, 10)], (latitude, longitude)
+    expected = np.histogram2d(*map(np.ravel, places), edges, weights=load.ravel())[0]
     assert images.outside[row] > 1.0  # part of the patch lies beside the grid
     np.testing.assert_allclose(images.forces[row], expected, atol=2e-3 * expected.max())
 

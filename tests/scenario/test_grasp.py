@@ -66,6 +66,10 @@ def out(folder):
     return folder / "made.toml"
 
 
+ALONG_Y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
+ROD = Cylinder(radius=0.02, length=0.2)
+
+
 def hand_of():
     loaded = robots.load_file(GRIPPER)
     tips = [Tip(s.frame, s.radius, np.array(s.offset), "") for s in robots.end_spheres(loaded)]
@@ -74,25 +78,21 @@ def hand_of():
 
 def test_fingers_close_on_a_part(tmp_path):
     """All centers stand a radius and the gap away from a cylinder: a distance to its axis."""
-    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
-    along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
-    q, points, normals = hand.close_on(
-        np.tile([-0.3, 0.6], 3), shell, along_y, np.array([1e-4, 2e-4, -1e-4])
-    )
+    hand, gaps = hand_of(), np.array([1e-4, 2e-4, -1e-4])
+    q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell_of(ROD), ALONG_Y, gaps)
     centers = hand.centers(q)
     away = np.hypot(centers[:, 0], centers[:, 2] + 0.1)
     # The cylinder is a mesh: curved elements, a micrometer off.
-    assert away - 0.03 == pytest.approx([1e-4, 2e-4, -1e-4], abs=2e-6)
+    assert away - 0.03 == pytest.approx(gaps, abs=2e-6)
     assert np.allclose(points, centers - (away - 0.02)[:, None] * normals, atol=2e-6)
 
 
 def test_torques_do_the_work_of_the_forces(tmp_path):
     """Virtual work: of forces on points that move with the tips."""
-    hand, shell = hand_of(), shell_of(Cylinder(radius=0.02, length=0.2))
-    along_y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
-    q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell, along_y, 0.0)
+    hand = hand_of()
+    q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell_of(ROD), ALONG_Y, 0.0)
     forces = np.random.default_rng(0).normal(size=(3, 3))
-    torques = hand.torques(Grasp(q, along_y, points, normals, forces, 0.0))
+    torques = hand.torques(Grasp(q, ALONG_Y, points, normals, forces, 0.0))
     model, step = hand.model, 1e-6
 
     def moved(q):

@@ -37,17 +37,6 @@ def test_a_knob_acts_on_the_run_under_way(live: LiveRun) -> None:
     assert live.built.scenario.contact[0].law.stiffness == 1e5
 
 
-def test_gravity_goes_on_from_where_the_run_is(live: LiveRun) -> None:
-    settle(live)
-    time, q = live.time, live.q.copy()
-    live.change("gravity.2", -5.0)
-    assert live.time == time
-    np.testing.assert_array_equal(live.q, q)
-    settle(live)
-    mass = float(live.scene.model.inertias[1].mass)
-    assert live.contacts.normal_force.sum() == pytest.approx(5.0 * mass, rel=1e-3)
-
-
 def test_what_only_a_start_can_use_starts_anew(live: LiveRun) -> None:
     live.advance(0.2)
     live.change("robot.ball.start.root_joint.2", 0.05)

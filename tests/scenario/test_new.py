@@ -3,6 +3,7 @@
 import shutil
 import tomllib
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -159,7 +160,7 @@ def test_what_cannot_be_found_out_is_asked_for_in_one_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_file_that_is_there_stays(tmp_path, monkeypatch):
+def test_a_file_that_is_there_stays(tmp_path):
     path = tmp_path / "a.toml"
     path.write_text("precious", encoding="utf-8")
     with pytest.raises(ScenarioError, match="--force"):
@@ -167,14 +168,9 @@ def test_a_file_that_is_there_stays(tmp_path, monkeypatch):
     with pytest.raises(NameNotFound):
         new_scenario("ball", "blub", out=path, force=True)
     assert path.read_text(encoding="utf-8") == "precious"
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    with monkeypatch.context() as patch:
-        patch.setattr("os.replace", full)
-        with pytest.raises(ResultError, match="No space left"):
-            new_scenario("ball", out=path, force=True)
+    full = OSError(28, "No space left on device")
+    with patch("os.replace", side_effect=full), pytest.raises(ResultError, match="No space left"):
+        new_scenario("ball", out=path, force=True)
     assert path.read_text(encoding="utf-8") == "precious"
     assert list(tmp_path.iterdir()) == [path]
     new_scenario("ball", out=path, force=True)

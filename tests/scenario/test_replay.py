@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import ResultError, SphshellError
+from sphshell_pin.errors import ResultError
 from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from tests import models
 from tests.scenario.files import DROP, without_pictures, write
-from tests.texts import text_of
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
 
@@ -70,44 +69,6 @@ def test_a_scene_of_ones_own_is_played_where_it_ran():
     assert replay.scene is scene
     with pytest.raises(ResultError, match="does not say"):
         Replay(dataclasses.replace(result, scene=None))
-
-
-ROUTINE = """
-from pathlib import Path
-
-Path(__file__).with_name("executed").touch()
-
-
-def find(pose_i, pose_j):
-    depth = 0.012 - pose_i.translation[2]
-    return [pose_i.translation], [[0.0, 0.0, 1.0]], [depth]
-
-
-def torque(t, q, v, contacts):
-    return [0.0] * 6
-
-
-def figure(result, scene):
-    return 1.0
-"""
-
-SOURCE = text_of("scenarios/source.toml")
-
-
-@pytest.fixture
-def with_code(tmp_path):
-    """A folder with a scenario, its routine, which notes that it is executed, and its results."""
-    (tmp_path / "routine.py").write_text(ROUTINE)
-    run_built(build(write(tmp_path, SOURCE)), tmp_path / "out", recording=False)
-    (tmp_path / "executed").unlink()
-    return tmp_path
-
-
-def test_the_routine_is_not_loaded(with_code):
-    replay = Replay(with_code / "out" / "run.npz")
-    with pytest.raises(SphshellError, match=r"routine.py:find.*build the scenario again"):
-        replay.scene.contacts(replay.result.q[0])
-    assert not (with_code / "executed").exists()
 
 
 def test_elements_that_the_surface_does_not_have_are_refused(folder):

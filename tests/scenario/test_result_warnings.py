@@ -115,21 +115,18 @@ def test_the_commands_say_so(scenario, tmp_path):
     assert "Warning: the controller's path is off the shell" in explained.output
 
 
-WRONG = {
-    "short": (
-        "def tau(t, q):\n    return 0\n",
-        r"'tau\(t, q\)' must take tau\(t, q, v, contacts\)",
-    ),
-    "long": (
-        "def tau(t, q, v, contacts, gain):\n    return 0\n",
-        r"'tau\(t, q, v, contacts, gain\)' must take tau\(t, q, v, contacts\).*'gain'",
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", WRONG)
-def test_a_callable_of_the_wrong_signature(kind, tmp_path):
-    code, said = WRONG[kind]
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ("t, q", r"'tau\(t, q\)' must take tau\(t, q, v, contacts\)"),
+        (
+            "t, q, v, contacts, gain",
+            r"gain\)' must take tau\(t, q, v, contacts\).*'gain'",
+        ),
+    ],
+)
+def test_a_callable_of_the_wrong_signature(arguments, said, tmp_path):
+    code = f"def tau({arguments}):\n    return 0\n"
     (tmp_path / "own.py").write_text(code, encoding="utf-8")
     text = DROP + '\n[controller]\ntype = "python"\nfunction = "own.py:tau"\n'
     with pytest.raises(ScenarioError, match=said):

@@ -21,16 +21,14 @@ def shell_of(geometry) -> sp.Shell:
 
 def test_feet_come_down_on_what_is_under_them():
     """Four feet over a plate that only one can reach: that one has the gap."""
-    plate = shell_of(coal.Box(0.1, 0.1, 0.02))
     feet = np.array([[x, y, 0.3] for x in (-0.4, 0.4) for y in (-0.2, 0.2)])
     radii = np.full(4, 0.02)
-    way = way_down(plate, feet, radii, 0.002)
-    gaps = np.abs(plate.closest_points(feet + way).distances) - radii
-    assert gaps.min() == pytest.approx(0.002, rel=2e-3)
+    for size in (0.1, 2.0):
+        plate = shell_of(coal.Box(size, size, 0.02))
+        way = way_down(plate, feet, radii, 0.002)
+        gaps = np.abs(plate.closest_points(feet + way).distances) - radii
+        assert gaps.min() == pytest.approx(0.002, rel=2e-3)
     # Over a plate that is large enough all of them have it.
-    large = shell_of(coal.Box(2.0, 2.0, 0.02))
-    way = way_down(large, feet, radii, 0.002)
-    gaps = np.abs(large.closest_points(feet + way).distances) - radii
     np.testing.assert_allclose(gaps, 0.002, rtol=2e-3)
 
 
@@ -41,11 +39,8 @@ def test_a_spot_avoids_edges_and_grooves():
     up = np.array([0.0, 0.0, 1.0])
     middle = find_touch_point(shell, 0.01, 1e-3, toward=up)
     assert not touches_once(shell, middle, middle.point[None], 0.01, 1e-3)
-    good = next(
-        spot
-        for spot in touch_points(shell, 0.01, 1e-3, toward=up)
-        if touches_once(shell, spot, spot.point[None], 0.01, 1e-3)
-    )
+    spots = touch_points(shell, 0.01, 1e-3, toward=up)
+    good = next(one for one in spots if touches_once(shell, one, one.point[None], 0.01, 1e-3))
     assert abs(good.point[0]) > 0.002
     np.testing.assert_allclose(np.abs(good.normal), [np.sqrt(0.5), 0, np.sqrt(0.5)], atol=1e-6)
     # A path ends before the ridge, too.

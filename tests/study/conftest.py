@@ -2,6 +2,8 @@
 
 import pytest
 
+from tests.export.conftest import finger, table  # noqa: F401
+
 
 @pytest.fixture
 def bounce(tmp_path):

@@ -9,22 +9,11 @@ import sphshell_pin as sp
 from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.plot.compare import plot_compare
-from sphshell_pin.study.compare import Curve, Measured, compare, measured, tables_of
+from sphshell_pin.study.compare import Curve, Measured, compare, measured
 from tests.command import refused, succeed
-from tests.export.runs import finger_run, turntable_run
 from tests.scenario.files import DROP, write
 
 pytestmark = pytest.mark.usefixtures("no_pictures")
-
-
-@pytest.fixture(scope="module")
-def finger():
-    return finger_run()
-
-
-@pytest.fixture(scope="module")
-def table():
-    return turntable_run()
 
 
 def run(label, t, values, figures=None, curves=("force",)):
@@ -107,16 +96,6 @@ def test_settings_that_differ_are_listed_by_their_keys(finger):
     assert compare(runs)[0].settings == (("contact.tip.law.stiffness", 1e6, 2e6),)
 
 
-def test_tables_have_every_run(finger):
-    one = measured("one", finger, finger.scene)
-    tables = tables_of(compare([one, replace(one, label="two"), replace(one, label="three")]))
-    figures = tables["figures"]
-    assert figures["first"] == figures["other"]
-    assert set(figures["difference"]) == {0.0}
-    assert set(tables["curves"]["run"]) == set(figures["run"]) == {"two", "three"}
-    assert len({len(column) for column in figures.values()}) == 1
-
-
 def test_a_diverged_run_is_compared_up_to_there(finger):
     q = finger.q.copy()
     q[10:] = np.inf
@@ -156,6 +135,7 @@ def test_the_command_prints_differences_and_writes_them(tmp_path, monkeypatch):
         assert words in printed.output
     names = ["compare.png", "curves.csv", "figures.csv"]
     assert sorted(one.name for one in (tmp_path / "both").iterdir()) == names
+    assert (tmp_path / "both" / "curves.csv").read_text().splitlines()[1].startswith("stiff,")
     head, *lines = (tmp_path / "both" / "figures.csv").read_text().splitlines()
     assert head == "run,figure,unit,first,other,difference,relative"
     stats = [sp.Result.load(one / "run.npz").stats for one in (soft, stiff)]

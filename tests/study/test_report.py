@@ -195,11 +195,3 @@ def test_tables_of_an_old_report_go(stubs, tmp_path):
     making.make_report(tmp_path)
     assert not (tmp_path / "old.csv").exists()
     assert (tmp_path / "mine.csv").read_text() == "keep me"
-
-
-def test_a_folder_that_cannot_be(stubs, tmp_path):
-    (tmp_path / "file").write_text("mine")
-    ran = call("report", "--out", tmp_path / "file")
-    assert ran.exit_code == 2
-    assert "the folder cannot be written" in ran.stderr
-    assert (tmp_path / "file").read_text() == "mine"

@@ -17,25 +17,30 @@ def values(text):
     return grid_of([f"key={text}"]).values["key"]
 
 
-def test_equal_steps_have_both_ends_and_short_numbers():
-    assert values("0:1:11") == (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-    assert values("1:-1:3") == (1.0, 0.0, -1.0)
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        # Equal steps and factors have both ends and short numbers.
+        ("0:1:11", (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)),
+        ("1:-1:3", (1.0, 0.0, -1.0)),
+        ("1e3:1e6:log:4", (1e3, 1e4, 1e5, 1e6)),
+        # Lists are of numbers, words, truths or lists.
+        ("1, 2.5,1e-3, .5", (1, 2.5, 1e-3, 0.5)),
+        ("adaptive,implicit", ("adaptive", "implicit")),
+        ("true,false", (True, False)),
+        ("[0,0,-9.81],[0, 0, -1.6]", ("[0, 0, -9.81]", "[0, 0, -1.6]")),
+        ("a.py:f,b.py:g", ("a.py:f", "b.py:g")),
+    ],
+)
+def test_a_text_is_steps_or_a_list(text, found):
+    assert values(text) == found
 
 
 def test_equal_factors_have_both_ends_and_one_ratio():
-    assert values("1e3:1e6:log:4") == (1e3, 1e4, 1e5, 1e6)
     found = values("2.5e-3:7:log:9")
     assert (found[0], found[-1]) == (2.5e-3, 7.0)
     ratios = [b / a for a, b in pairwise(found)]
     assert ratios == pytest.approx([(7 / 2.5e-3) ** (1 / 8)] * 8, rel=1e-11)
-
-
-def test_lists_are_numbers_words_truths_or_lists():
-    assert values("1, 2.5,1e-3, .5") == (1, 2.5, 1e-3, 0.5)
-    assert values("adaptive,implicit") == ("adaptive", "implicit")
-    assert values("true,false") == (True, False)
-    assert values("[0,0,-9.81],[0, 0, -1.6]") == ("[0, 0, -9.81]", "[0, 0, -1.6]")
-    assert values("a.py:f,b.py:g") == ("a.py:f", "b.py:g")
 
 
 def test_python_values_are_taken_as_they_are_and_numbers_as_exact_texts():
@@ -70,16 +75,12 @@ def test_the_last_key_turns_fastest():
         ({"k": [None]}, "numbers, words"),
         ({"k": 3}, "list of values"),
         ("no_equals", "no_equals"),
+        (["a=0:1:2000", "b=0:1:2000"], "too many"),
     ],
 )
 def test_wrong_values_are_told(vary, words):
     with pytest.raises(InvalidParameter, match=words):
         grid_of(vary)
-
-
-def test_too_many_runs_are_told():
-    with pytest.raises(InvalidParameter, match="too many"):
-        grid_of(["a=0:1:2000", "b=0:1:2000"])
 
 
 @pytest.mark.parametrize(
