@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.mimic import Mimic, mimics, shortened, with_mim
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from tests import meshes, models
+from tests.studies import mostly_studies
 from tests.texts import text_of
 
 
@@ -191,7 +192,7 @@ def random_tree(rng: np.random.Generator) -> Tree:
     return Tree(free, with_mimics(free, rules))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", mostly_studies(range(1500), lambda seed: seed < 60))
 def test_accelerations_of_random_trees_are_those_of_recursive_newton_euler(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tree = random_tree(rng)
