@@ -12,6 +12,7 @@ from pathlib import Path
 from sphshell_pin.base.regular_file import open_regular
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.files import RobotError, build_model, read
+from sphshell_pin.robots.inertia import mass_fault
 from sphshell_pin.robots.packages import NAMED_ROBOT
 
 _PACKAGE = "robot_descriptions"
@@ -61,36 +62,45 @@ def library_source(name: str) -> Source:
 
 
 _MOST_FOLDERS, _MOST_FILES = 5000, 60
-_FRAMES = 8  # of a robot, that are named
 _HEAD = 4000  # beginnings of files [bytes]
 
 
-def find_robots(folder: str | PathLike[str]) -> Iterator[tuple[Path, str]]:
-    """Yield the robots of the URDF, xacro and MJCF files in `folder` and below.
+@dataclass(frozen=True)
+class FoundRobot:
+    """A robot's file: its joints, the frames that carry no other, what is missing."""
 
-    Each with its joints and the frames that carry no other, or with what is missing, in words.
-    """
+    file: Path
+    joints: int = 0
+    frames: tuple[str, ...] = ()
+    missing: str = ""
+    """A sentence; empty if nothing is."""
+
+
+def find_robots(folder: str | PathLike[str]) -> Iterator[FoundRobot]:
+    """Yield the robots of the URDF, xacro and MJCF files in `folder` and below."""
     for file in _candidates(Path(folder)):
         try:
-            with warnings.catch_warnings(action="ignore"):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")
                 description = read(file)
                 if not description.is_mjcf and description.root.find("link") is None:
                     continue  # macros alone
                 model = build_model(description, mimic=True)
         except SphshellError as error:
-            yield file, f"missing: {str(error).removeprefix(f'{file}: ')}"
+            yield FoundRobot(file, missing=str(error).removeprefix(f"{file}: "))
             continue
         if not model.nv:
             continue
         carriers = {int(one.parentFrame) for one in model.frames}
-        ends = [
+        frames = [
             one.name
             for k, one in enumerate(model.frames)
             if one.parentJoint > 0 and k not in carriers
         ]
-        shown = ", ".join(ends[:_FRAMES]) + (", ..." if ends[_FRAMES:] else "")
-        absent = [f"; missing: {one}" for one in description.notes if "there is no package" in one]
-        yield file, f"{model.njoints - 1} joints, frames at its ends: {shown}{''.join(absent)}"
+        absent = [one for one in description.notes if "there is no package" in one]
+        fault = mass_fault(model, description.q0(model), description) or "; ".join(absent)
+        fault = "masses: --density 2700" if "--density" in fault else fault
+        yield FoundRobot(file, model.njoints - 1, tuple(frames), fault)
 
 
 def _candidates(folder: Path) -> Iterator[Path]:

@@ -6,9 +6,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
 from os import PathLike
 
-from sphshell_pin.robots.files import RobotError, read, unwound
+import pinocchio as pin
+
+from sphshell_pin.robots.files import RobotError, build_geometry, build_model, read, unwound
 from sphshell_pin.robots.inertia import with_density
-from sphshell_pin.robots.mesh_faults import mesh_fault
 
 _DECLARED = re.compile(r"\{(urn:([\w.-]+))\}")
 
@@ -18,8 +19,8 @@ def mended(
     package_dirs: Iterable[str | PathLike[str]] = (),
     xacro_args: Mapping[str, object] | None = None,
     density: float | None = None,
-) -> str:
-    """Return a URDF as text.
+) -> tuple[str, list[str]]:
+    """Return a URDF as text, with a comment beside each change, and the changes as sentences.
 
     Links without a mass get that of their geometry at `density` [kg/m^3]; prefixes are declared;
     continuous joints that mimic by a part of their turn become revolute; meshes are named by
@@ -29,20 +30,45 @@ def mended(
     stated = read(path, package_dirs, xacro_args)
     if stated.is_mjcf:
         raise RobotError(f"{path}: is an MJCF; --mend writes URDFs, of a URDF or xacro file")
-    if density is not None:
-        stated, _ = with_density(stated, density)
-    root = copy.deepcopy(unwound(stated)[0].root)
-    for link in root.iter("link"):
-        for shape in (*link.findall("visual"), *link.findall("collision")):
-            mesh = shape.find("geometry/mesh")
-            if mesh is not None:
-                found = stated.folders.find(mesh.get("filename", ""))
-                if found is None or mesh_fault(found):
+    changes: list[str] = []
+    filled, _ = with_density(stated, density) if density is not None else (stated, "")
+    straight, wound = unwound(filled)
+    root = copy.deepcopy(straight.root)
+    model = build_model(stated)
+    kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
+    missing = [uri for kind in kinds for uri in build_geometry(stated, model, kind)[1]]
+
+    def note(parent: ET.Element, at: int, text: str) -> None:
+        parent.insert(at, ET.Comment(f" {text.replace('--', '- -')} "))
+        changes.append(text)
+
+    for before, link in zip(stated.root.findall("link"), root.findall("link"), strict=True):
+        name = link.get("name")
+        for kind in ("visual", "collision"):
+            for shape in link.findall(kind):
+                mesh = shape.find("geometry/mesh")
+                uri = "" if mesh is None else mesh.get("filename", "")
+                if uri in missing:
+                    at = list(link).index(shape)
                     link.remove(shape)
-                else:
+                    note(link, at, f"link {name}: without the mesh {uri}, missing or broken")
+                elif mesh is not None and (found := stated.folders.find(uri)) is not None:
                     mesh.set("filename", str(found.absolute()))
-    names = " ".join(str(name) for one in root.iter() for name in (one.tag, *one.attrib))
-    for uri, prefix in _DECLARED.findall(names):
+                    if mesh.get("filename") != uri:
+                        note(link, list(link).index(shape), f"link {name}: {uri} by its path")
+        if link.find("inertial") is not None and _mass_of(link) != _mass_of(before):
+            note(link, 0, f"link {name}: the mass of its geometry at {density:g} kg/m^3")
+    for joint in root.findall("joint"):
+        if joint.get("name") in wound:
+            note(joint, 0, f"joint {joint.get('name')}: was continuous, but mimics or is mimicked")
+    names = [str(name) for one in root.iter() for name in (one.tag, *one.attrib)]
+    for uri, prefix in sorted(set(_DECLARED.findall(" ".join(names)))):
         ET.register_namespace(prefix, uri)
+        note(root, 0, f"the prefix {prefix} is declared")
     ET.indent(root)
-    return ET.tostring(root, encoding="unicode", xml_declaration=True)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True), changes
+
+
+def _mass_of(link: ET.Element) -> str | None:
+    mass = link.find("inertial/mass")
+    return None if mass is None else mass.get("value")

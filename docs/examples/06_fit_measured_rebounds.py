@@ -29,7 +29,7 @@ gravity = [0.0, 0.0, 0.0]  # the impact takes 15 microseconds
 
 [robot]
 file = "alumina.urdf"
-base = "floating"
+free_flyer = true
 
 [robot.start]
 root_joint = [0.0, 0.0, {RADIUS + 1e-7}, 0.0, 0.0, 0.0, 1.0]

@@ -73,8 +73,11 @@ def check_robot_(
         from sphshell_pin.robots.mending import mended
 
         args = common.xacro_args_of(xacro_arg)
-        write_whole(mend, mended(names[0], package_dir or (), args, density).encode())
+        text, changes = mended(names[0], package_dir or (), args, density)
+        write_whole(mend, text.encode())
         common.say(f"Written: {mend}")
+        for change in changes:
+            common.say(f"  {change}")
         names, package_dir, xacro_arg, density = [str(mend)], None, None, None
     sizes = study.QUICK if quick else study.Sizes()
     check = partial(

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from sphshell_pin.scenario.drafting.searching import NewScenario
 
 
+_FRAMES = 8  # of a robot in a list
+
+
 @common.command()
 def new(
     *,
@@ -34,6 +37,7 @@ def new(
     length: str | None = None,
     tips: Literal["one", "all"] = "one",
     base: Literal["fixed", "floating"] | None = None,
+    free_flyer: bool = False,
     package_dir: common.PackageDirOption = None,
     xacro_arg: common.XacroArgOption = None,
     density: common.DensityOption = None,
@@ -67,6 +71,7 @@ def new(
     length LENGTH : Of a path: 0.06 [m] or 60mm.
     tips : all: the fingertips of a hand hold the surface, as a free part.
     base : Of the robot; by default as its file and its shape say.
+    free_flyer : The same as --base floating.
     out : The file to write; default: ROBOT_on_SURFACE.toml.
     force : Replace the file if it is there already.
     """
@@ -94,7 +99,7 @@ def new(
                 path=path,
                 length=common.length_of("--length", length),
                 tips=tips,
-                base=base,
+                base="floating" if free_flyer else base,
                 package_dirs=package_dir or (),
                 xacro_args=common.xacro_args_of(xacro_arg),
                 density=density,
@@ -114,9 +119,14 @@ def _list_robots(folder: str) -> NoReturn:
     from sphshell_pin.robots.finding import find_robots
 
     count = 0
-    for file, said in find_robots(folder):
+    for one in find_robots(folder):
         count += 1
-        common.say(f"{file}: {said}")
+        common.say(f"{one.file}: {one.joints} joints" if one.joints else f"{one.file}")
+        if one.frames:
+            shown = ", ".join(one.frames[:_FRAMES]) + (", ..." if one.frames[_FRAMES:] else "")
+            common.say(f"  frames at its ends: {shown}")
+        if one.missing:
+            common.say(f"  missing: {one.missing}")
     which = f"say which of these {count} robots: --robot FILE" if count else "holds no robot's file"
     raise SphshellError(f"{folder}: {which}")
 

@@ -305,7 +305,7 @@ def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
 SWING = """
 title = "A link swings against its stop"
 [robot]
-file = "link.urdf"
+urdf = "link.urdf"
 joints = ["limits", "damping"]
 start = { hinge = -0.9 }
 [[joint]]

@@ -71,11 +71,12 @@ def test_a_workspace_lists_its_robots(tmp_path: Path) -> None:
     asking = file.with_name("asking.xacro")
     far = '<xacro:include filename="$(find far)/a.xacro"/><xacro:a/>'
     asking.write_text(file.read_text().replace("<link", f"{far}<link", 1))
-    found = {file.name: said for file, said in find_robots(tmp_path)}
+    found = {one.file.name: one for one in find_robots(tmp_path)}
     assert sorted(found) == ["arm.xacro", "asking.xacro", "bare.urdf"]
-    assert found["arm.xacro"].endswith("frames at its ends: tip")
-    assert found["bare.urdf"].startswith("1 joints")
-    assert "there is no package 'far'" in found["asking.xacro"]
+    assert found["arm.xacro"].frames == ("tip",)
+    assert not found["arm.xacro"].missing
+    assert "--density" in found["bare.urdf"].missing
+    assert "there is no package 'far'" in found["asking.xacro"].missing
     assert "say which of these 3 robots" in call("new", "--robot", tmp_path).output
 
 

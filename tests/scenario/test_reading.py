@@ -41,8 +41,8 @@ def test_changes_by_dotted_key(tmp_path):
 def test_a_key_as_a_fault_tells_it_may_be_set(table, tmp_path):
     path = write(tmp_path, DROP.replace("[robot]", table).replace('name = "ball"', 'name = "a.b"'))
     with pytest.raises(ScenarioError) as caught:
-        read_scenario(path, {"robot.a.b.mimic": "5"})
-    assert caught.value.key == "robot.a.b.mimic"
+        read_scenario(path, {"robot.a.b.free_flyer": "5"})
+    assert caught.value.key == "robot.a.b.free_flyer"
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_stated_joints_are_where_the_search_begins_and_locked_ones_stay(tmp_path
 
 def test_places_are_those_of_the_world(tmp_path):
     """Of two arms, the second stands elsewhere and is turned."""
-    more = 'label = "one"\n[[robot]]\nfile = "arm.urdf"\nlabel = "two"\n'
+    more = 'label = "one"\n[[robot]]\nurdf = "arm.urdf"\nlabel = "two"\n'
     more += "placement = { xyz = [1.0, 0.0, 0.0], rpy_deg = [0.0, 0.0, 90.0] }\n"
     more += "start = { tip_at = { xyz = [0.8, 0.2, 0.3], frame = 'link_5' } }\n"
     built = build(scenario(tmp_path, f"{{ tip_at = {XYZ} }}", more, sphere="one/link_5"))

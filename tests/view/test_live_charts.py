@@ -7,7 +7,7 @@ import pytest
 
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.scenario.running.rows import Rows, Series
-from sphshell_pin.view.live.charts import MOST_KEPT, Charts, Thinner
+from sphshell_pin.view.live.charts import MOST_KEPT, Charts, History, Thinner
 
 
 def rows_of(t, normal, **more):
@@ -48,20 +48,18 @@ def test_what_is_no_number_is_shown_as_none():
     assert np.isnan(first)
 
 
-def test_the_newest_rows_are_kept_however_they_came():
+def test_a_history_gives_back_its_newest_rows_however_they_came():
     rng = np.random.default_rng(1)
-    series = [Series("x", "Position", "x", "m", "q", lambda block: block[:, 0])]
-    charts, t = charts_of(series=series), np.arange(MOST_KEPT + 5000) * 1e-3
-    charts.ask("tab", ["x"])
+    history, t = History(), np.arange(MOST_KEPT + 5000) * 1e-3
+    q = np.stack((t, -t), 1)
     for piece in np.split(np.arange(len(t)), np.sort(rng.integers(0, len(t), 3000))):
-        charts.add(rows_of(t[piece], t[piece], q=-t[piece, None]), 1.0)
-    points = np.array(charts.again(-np.inf, 1e-6))
-    np.testing.assert_array_equal(points[:, 0], t[-MOST_KEPT:-1])
-    np.testing.assert_array_equal(points[:, 1], -points[:, 0])
-    np.testing.assert_array_equal(charts.again(t[-10], 1e-6)[0][0], t[-10])
-    assert charts.again(1e9, 1e-6) == []
-    charts.clear()
-    assert charts.again(0.0, 1e-6) == []
+        history.add(rows_of(t[piece], t[piece], q=q[piece]))
+    rows = history.since(-np.inf)
+    np.testing.assert_array_equal(rows.t, t[-MOST_KEPT:])
+    np.testing.assert_array_equal(rows.more["q"], q[-MOST_KEPT:])
+    np.testing.assert_array_equal(history.since(t[-10]).t, t[-10:])
+    assert history.since(1e9) is None
+    assert History().since(0.0) is None
 
 
 def test_only_the_curves_that_are_asked_for_are_computed():

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.base.checks import read_only
 from sphshell_pin.base.summary import Fact, Summarized
-from sphshell_pin.errors import NameNotFound
+from sphshell_pin.errors import NameNotFound, import_extra
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 class Readings(dict[str, Array | float | bool]):
@@ -50,6 +54,16 @@ class SensorLog(Summarized):
         """Return the last reading (k,) that had arrived at time `t` [s]; nan before the first."""
         row = int(np.searchsorted(self.t, t, side="right")) - 1
         return self.values[row] if row >= 0 else np.full(len(self.columns), np.nan)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a pandas DataFrame, one row a reading, units in the names.
+
+        Raises MissingExtra without pandas.
+        """
+        pandas = import_extra("pandas", "tables", "SensorLog.to_dataframe")
+        columns = {"t [s]": self.t, "sampled [s]": self.sampled}
+        columns |= dict(zip(self.columns, self.values.T, strict=True))
+        return pandas.DataFrame(columns)
 
 
 def split_logs(

@@ -234,8 +234,11 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
                 f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot), base=base, mimic=asked.mimic)
+    source: dict[str, Any] = {
+        "urdf" if file.suffix.lower() == ".urdf" else "file": _relative(file, path)
+    }
     return RobotSection(
-        file=_relative(file, path),
+        **source,
         package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
         base=base,

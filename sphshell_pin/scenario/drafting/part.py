@@ -52,7 +52,7 @@ class Part:
     def beside(self, built: Built, name: str) -> Built:
         """Return `built` with it as a second robot, so that neither is read from files."""
         loaded = (built.assembly.loaded[0], self.loaded())
-        section = RobotSection(file=part_file(name), base="floating", label="part")
+        section = RobotSection(urdf=part_file(name), free_flyer=True, label="part")
         scenario = built.scenario.model_copy(update={"robot": [*built.scenario.robot, section]})
         return replace(built, scenario=scenario, assembly=replace(built.assembly, loaded=loaded))
 

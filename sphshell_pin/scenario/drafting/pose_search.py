@@ -82,7 +82,7 @@ class PressSearch(Search):
         if joint_of(self.model, tip.frame) == 0:
             raise SphshellError(
                 f"no joint moves frame '{tip.frame}': name another with --frame, or let the root "
-                "float with --base floating"
+                "float with --free-flyer"
             )
         known = WORKING.get(self.section.name or "", ())
         q = np.array(known) if len(known) == self.model.nq else self.q0

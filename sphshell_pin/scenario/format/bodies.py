@@ -206,7 +206,7 @@ def _tip_frame(
 
 def origin(section: schema.RobotSection) -> tuple[object, ...]:
     """Return what tells robots of one scenario's folder apart before they start and are placed."""
-    plain = ("name", "file", "density", "srdf", "pose", "floats", "mimic")
+    plain = ("name", "path", "density", "srdf", "pose", "floats", "mimic")
     lists = tuple(section.package_dirs), tuple(section.xacro_args.items())
     return (*(getattr(section, one) for one in plain), *lists)
 
@@ -248,7 +248,7 @@ def joint_spans(model: pin.Model, name: str) -> tuple[slice, slice]:
 def _load(section: schema.RobotSection, path: Path) -> LoadedRobot:
     if section.name is not None:
         return load(section.name, free_flyer=section.floats, mimic=section.mimic, pose=section.pose)
-    folder, file = path.parent, section.file or ""
+    folder, file = path.parent, section.path or ""
     return load_file(
         folder / file,
         [folder / one for one in section.package_dirs],

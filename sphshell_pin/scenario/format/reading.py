@@ -181,7 +181,7 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     node, last, trail = _descend(data, key, path)
     numbers = [str(i) for i in range(len(node))] if isinstance(node, list) else []
     if last not in (numbers or node):
-        named = [_name_of(item) for item in node if isinstance(item, dict)] if numbers else node
+        named = [_item_name(item) for item in node if isinstance(item, dict)] if numbers else node
         known = [one for one in named if one] or numbers
         hint = did_you_mean(last, known)
         reason = f"the scenario has no '{last}' there; {hint}{hint and ' '}there are: "
@@ -286,7 +286,7 @@ def _change(
         if rest.isdecimal() and int(rest) < len(node):
             node[int(rest)] = value
             return
-        names = [_name_of(item) for item in node if isinstance(item, dict)]
+        names = [_item_name(item) for item in node if isinstance(item, dict)]
         raise ScenarioError(path, key, f"no item '{rest}'; there are: {_listed(names)}")
     # A table that the file does not have yet (it stands at its defaults) is made.
     *tables, last = rest.split(".")
@@ -305,7 +305,7 @@ def _descend(
     node: Toml = data
     while True:
         if isinstance(node, list):
-            heads = {_name_of(item): item for item in node if isinstance(item, dict)}
+            heads = {_item_name(item): item for item in node if isinstance(item, dict)}
             heads |= {str(i): item for i, item in enumerate(node)}
         else:
             heads = node
@@ -325,7 +325,7 @@ def _descend(
         # A table alone is a list of one: its name or number may stand in the key as in a list's.
         if single:
             rest = rest.removeprefix("0.")
-        if single and (name := _name_of(node)) not in node:
+        if single and (name := _item_name(node)) not in node:
             rest = rest.removeprefix(f"{name}.")
 
 
@@ -333,7 +333,7 @@ def _spelled_out(node: Toml, head: str) -> str:
     """Return the name of the item that `head` is the index of, where that name tells it."""
     if not isinstance(node, list) or not head.isdecimal() or not isinstance(node[0], dict):
         return head
-    names = [_name_of(item) for item in node]
+    names = [_item_name(item) for item in node]
     name = names[int(head)] if int(head) < len(names) else ""
     return name if name and names.count(name) == 1 else head
 
@@ -344,6 +344,10 @@ def _keys_of(table: str) -> Iterable[str]:
     if table == "sensor":
         return {key for kind in Sensor.kinds.values() for key in parameters_of(kind)}
     return section.model_fields  # type: ignore[no-any-return]
+
+
+def _item_name(item: Mapping[str, object]) -> str:
+    return _name_of(item) or str(item.get("urdf") or "")
 
 
 def _name_of(item: object) -> str:

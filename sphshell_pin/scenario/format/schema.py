@@ -73,16 +73,18 @@ StartValue: TypeAlias = Annotated[
 
 
 class RobotSection(Section):
-    """A robot or a single body: shipped (`name`) or your own (`file`)."""
+    """A robot or a single body: shipped (`name`) or your own (`file`; `urdf` is the same key)."""
 
     name: str | None = None
     file: str | None = None
+    urdf: str | None = None
     package_dirs: list[str] = []
     xacro_args: dict[str, bool | int | float | str] = {}
     density: shape_tables.Positive | None = None
     srdf: str | None = None
     pose: str | None = None
     base: Literal["fixed", "floating"] | None = None
+    free_flyer: bool = False
     mimic: bool = True
     label: str | None = None
     frame: str = "universe"
@@ -97,12 +99,17 @@ class RobotSection(Section):
     @pydantic.model_validator(mode="after")
     def check_one_source(self) -> RobotSection:
         """Refuse a robot with no description, or with two."""
-        if (self.name is None) == (self.file is None):
-            raise ValueError("give either name (a shipped robot) or file, not both")
+        if sum(one is not None for one in (self.name, self.file, self.urdf)) != 1:
+            raise ValueError(
+                "give either name (a shipped robot) or file (a URDF, xacro or MJCF; urdf is the "
+                "same key), not both"
+            )
         of_files = ("package_dirs", "xacro_args", "density", "srdf")
         beside = [key for key in of_files if getattr(self, key)]
         if self.name is not None and beside:
             raise ValueError(f"{' and '.join(beside)} belong to a file; drop them beside name")
+        if self.free_flyer and self.base is not None:
+            raise ValueError('free_flyer = true is base = "floating": state base alone')
         for name, value in self.start.items():
             if isinstance(value, TipAt) and name != TIP_AT:
                 raise ValueError(
@@ -130,9 +137,14 @@ class RobotSection(Section):
         return TipAt(xyz=at) if isinstance(at, list) else at if isinstance(at, TipAt) else None
 
     @property
+    def path(self) -> str | None:
+        """The robot's file, or None for a shipped robot."""
+        return self.file if self.file is not None else self.urdf
+
+    @property
     def floats(self) -> bool | None:
         """Whether the base floats; None: as the file states it."""
-        return None if self.base is None else self.base == "floating"
+        return True if self.free_flyer else None if self.base is None else self.base == "floating"
 
 
 _OF_FILES = {

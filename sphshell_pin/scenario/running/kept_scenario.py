@@ -103,7 +103,7 @@ def keep(
 
     held: list[_Robot | None] = []
     for section, robot in zip(scenario.robot, robots, strict=True):
-        description = robot.description if section.file is not None else None
+        description = robot.description if section.path is not None else None
         if description is None:
             held.append(None)
             continue
@@ -111,7 +111,7 @@ def keep(
             name: kept(path, Path(name).suffix.lower() or "none")
             for name, path in meshes_of(description).items()
         }
-        file = str(description.file.absolute() if description.is_mjcf else section.file)
+        file = str(description.file.absolute() if description.is_mjcf else section.path)
         text, q0 = text_of(description), robot.q0.tolist()
         held.append(_Robot(file=file, text=text, q0=q0, meshes=meshes))
     surfaces = {}
@@ -147,7 +147,7 @@ def restore(scenario: Scenario, kept: Kept) -> Restored:
     robots = {
         origin(section): _robot(section, one, kept)
         for section, one in zip(scenario.robot, contents.robots, strict=True)
-        if section.file is not None
+        if section.path is not None
     }
     surfaces = {}
     for one in scenario.shell:
@@ -187,14 +187,14 @@ def _at_hand(stated: Component, places: Mapping[str, Path | None]) -> Component:
 
 def _robot(section: RobotSection, one: _Robot | None, kept: Kept) -> LoadedRobot:
     if one is None:
-        raise SphshellError(f"it does not hold the robot '{section.file}'")
+        raise SphshellError(f"it does not hold the robot '{section.path}'")
     places = {}
     for name, digest in one.meshes.items():
         suffix = Path(name).suffix.lower()
         place = _place(kept, digest, suffix) if suffix in FORMATS else None
         if place is not None:
             places[name] = place
-    called = Path(section.file or "").name.partition(".")[0]
+    called = Path(section.path or "").name.partition(".")[0]
     return load_kept(
         one.text,
         one.file,

@@ -153,7 +153,7 @@ def files_of(scenario: Scenario) -> set[str]:
     """Return the files that `scenario` names: surfaces, robots, Python routines, tables of laws."""
     routines = [one.find for one in scenario.source] + list(scenario.figures.values())
     named = [one.file for one in scenario.shell]
-    named += [name for one in scenario.robot for name in (one.file, one.srdf)]
+    named += [name for one in scenario.robot for name in (one.path, one.srdf)]
     stated = [scenario.controller]
     for pair in scenario.contact:
         stated += pair.law, pair.friction

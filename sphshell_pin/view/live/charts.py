@@ -23,6 +23,33 @@ MOST_KEPT = 40_000  # rows of a run in memory: at 5 ms, those of 200 s
 MOST_PIECES = 100  # in which they are: joining copies all
 
 
+class History:
+    """The rows of a run, the newest ones of them, as they were recorded."""
+
+    def __init__(self) -> None:
+        self._pieces: list[Rows] = []
+
+    def add(self, rows: Rows) -> None:
+        """Keep `rows`, which follow the others."""
+        if len(rows):
+            self._pieces.append(rows)
+        if len(self._pieces) > MOST_PIECES:
+            self._join()
+
+    def since(self, t: float) -> Rows | None:
+        """Return the rows from time `t` [s] on; None where there are none."""
+        if not self._pieces:
+            return None
+        rows = self._join()
+        first = int(np.searchsorted(rows.t, t))
+        return rows.select(slice(first, None)) if first < len(rows) else None
+
+    def _join(self) -> Rows:
+        rows = self._pieces[0].joined(self._pieces).select(slice(-MOST_KEPT, None))
+        self._pieces = [rows]
+        return rows
+
+
 class Thinner:
     """Thins curves to the points that a chart can show.
 
@@ -88,7 +115,7 @@ class Charts:
         }
         self.keys: tuple[str, ...] = ()
         self._asked: dict[object, tuple[str, ...]] = {}
-        self._pieces: list[Rows] = []  # of the run, the newest rows of it
+        self._history = History()
         self._thinner = Thinner()
 
     @property
@@ -127,28 +154,19 @@ class Charts:
 
     def add(self, rows: Rows, spacing: float) -> list[Point]:
         """Take new rows of the run; return the points that they finish, `spacing` [s] apart."""
-        if len(rows):
-            self._pieces.append(rows)
-        if len(self._pieces) > MOST_PIECES:
-            self._pieces = [self._joined()]
+        self._history.add(rows)
         return self._thinner.add(rows.t, self._values(rows), spacing)
 
     def again(self, since: float, spacing: float) -> list[Point]:
         """Return the points of the run from time `since` [s] on, `spacing` [s] apart."""
         self._thinner.clear()
-        if not self._pieces:
-            return []
-        rows = self._joined()
-        rows = rows.select(slice(int(np.searchsorted(rows.t, since)), None))
-        return self._thinner.add(rows.t, self._values(rows), spacing)
+        rows = self._history.since(since)
+        return [] if rows is None else self._thinner.add(rows.t, self._values(rows), spacing)
 
     def clear(self) -> None:
         """Forget the rows of the run, as where it goes on at another time."""
-        self._pieces = []
+        self._history = History()
         self._thinner.clear()
-
-    def _joined(self) -> Rows:
-        return self._pieces[0].joined(self._pieces).select(slice(-MOST_KEPT, None))
 
     def _values(self, rows: Rows) -> Array:
         values = np.empty((len(rows), len(self.keys)))
