@@ -292,6 +292,9 @@ def test_readings_are_columns(tmp_path):
         at = log.columns.index(column)
         assert [float(t) for t, _ in found] == log.t.tolist()
         assert [float(x) for _, x in found] == log.values[:, at].tolist()
+    frame = result.sensors["torque"].to_dataframe()
+    assert list(frame) == ["t [s]", "sampled [s]", "force [N]"]
+    assert frame["force [N]"].tolist() == result.sensors["torque"].values[:, 0].tolist()
 
 
 def test_readings_are_drawn():
