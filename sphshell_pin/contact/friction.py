@@ -70,6 +70,11 @@ class Friction(Component):
         speed = check_not_negative("slip_speed", slip_speed, "m/s")
         return self._binding.coefficient(speed, check_positive("load", load, "N"))
 
+    @property
+    def largest_coefficient(self) -> float:
+        """The largest mu, at rest or nearly so; of a FunctionFriction under 1 N."""
+        raise NotImplementedError
+
 
 @dataclass(frozen=True)
 class Coefficients(Friction):
@@ -83,6 +88,11 @@ class Coefficients(Friction):
 
     mu_static: float = parameter(at_least=0, label="static friction")
     mu_dynamic: float = parameter(at_least=0, label="dynamic friction")
+
+    @property
+    def largest_coefficient(self) -> float:
+        """The static coefficient."""
+        return float(self.mu_static)
 
     @classmethod
     def of(cls, sphere: str, shell: str, **more: Any) -> Self:

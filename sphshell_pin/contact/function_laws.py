@@ -322,7 +322,12 @@ class FunctionFriction(OwnFunctions, Friction, kind="function"):
     @property
     def vanishes_at_rest(self) -> bool:
         """Whether under 1 N it falls to a tenth of its largest before slips are too slow to see."""
-        return self.coefficient(_SLOW) <= 0.1 * self.coefficient(self.sticking_speed)
+        return self.coefficient(_SLOW) <= 0.1 * self.largest_coefficient
+
+    @property
+    def largest_coefficient(self) -> float:
+        """The coefficient at `sticking_speed`, under 1 N."""
+        return self.coefficient(self.sticking_speed)
 
     def slip_time(self, mass: float, load: float, disc: float) -> float:
         """Return 20 times the decay of a slow slip [s]."""

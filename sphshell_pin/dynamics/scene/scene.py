@@ -165,6 +165,19 @@ class Scene(SceneParts):
         """
         return SceneContacts.from_rows(self._at(state).contacts(q, v))
 
+    def constraints(
+        self, q: ArrayLike, v: ArrayLike | None = None, state: SceneState | None = None
+    ) -> derivatives.ContactConstraints:
+        """Return all contacts at q (nq,), v (nv,) for Pinocchio's own solvers of constraints.
+
+        Their laws are not in them but for the stiffness: ADMM and PGS compute forces that hold the
+        bodies apart, with Coulomb's cones. `state` as in `contacts`.
+        """
+        contacts = self.contacts(q, v, state)
+        return derivatives.constraints_of(
+            self.model, self.pairs, self.check_state(q, v)[0], contacts
+        )
+
     def _at(self, state: SceneState | None) -> _core.Scene | _core.SceneState:
         if state is None:
             return self._binding
