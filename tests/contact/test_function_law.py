@@ -89,12 +89,15 @@ def test_friction_answers_as_its_twin(make) -> None:
     for speed in (0.0, 1e-6, 0.02, 0.1, 3.0):
         assert own.coefficient(speed, 5.0) == pytest.approx(SMOOTH.coefficient(speed), abs=1e-12)
     assert own.slip_time(2.0, 7.0, 0.0) == pytest.approx(SMOOTH.slip_time(2.0, 7.0, 0.0), rel=1e-9)
+    assert own.largest_coefficient == pytest.approx(0.3, rel=0.01)
     assert own.sticking_speed == pytest.approx(0.1, rel=0.15)
     assert (own.mu, own.v, own.has_state) == (0.3, 0.1, False)
     scenes = [models.on_plate(models.ball(), TWIN, one) for one in (own, SMOOTH)]
     for moves in (SLOW, MOVES, 0 * MOVES):
         ours, theirs = (one.external_forces(BALL, moves)[1].vector for one in scenes)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
+    (made,) = scenes[0].constraints(BALL).models
+    np.testing.assert_allclose(made.getFriction(), own.largest_coefficient)
 
 
 DEPTHS = [1e-13, 3e-7, 0.99e-4, 1.01e-4, 4e-4, 2e-3]
