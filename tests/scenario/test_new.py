@@ -101,7 +101,7 @@ def test_files_are_named_relative_to_the_scenario(tmp_path):
         out=old / "a.toml",
     )  # fmt: skip
     data = tomllib.loads(made.text)
-    assert data["robot"]["file"] == "parts/arm.urdf"
+    assert data["robot"]["urdf"] == "parts/arm.urdf"
     assert data["shell"][0]["file"] == "parts/my blade.stl"
     old.rename(tmp_path / "new")
     assert build(tmp_path / "new" / "a.toml").shells["my blade"].num_elements == 522
