@@ -1,4 +1,4 @@
-"""What is wrong in a scenario file is told in one sentence: file, key, value, valid choices."""
+"""An error in a scenario file is one sentence: file, key, value, valid choices."""
 
 import pytest
 

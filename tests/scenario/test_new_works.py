@@ -289,7 +289,7 @@ def test_what_the_file_states_of_the_joints_is_modelled(draft, tmp_path):
 def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
     """A capsule ends in its own half ball; on a cylinder's end stands a ball, in its middle."""
     robot = robots.load_file(PROBE)
-    for shape, radius, above, told in (
+    for shape, radius, above, words in (
         (coal.Capsule(0.02, 0.1), 0.02, 0, "covers the end of link 'link_5'"),
         (coal.Cylinder(0.03, 0.1), None, 1, "a ball on the end of link 'link_5'"),
     ):
@@ -303,7 +303,7 @@ def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
         )
         assert radius is None or tip.radius == pytest.approx(radius, rel=0.03)
         assert tip.offset == pytest.approx([0, 0, 0.1 + above * tip.radius], abs=1e-3)
-        assert told in tip.source
+        assert words in tip.source
 
 
 def test_a_sphere_inside_its_link_is_refused_with_a_command_that_works(draft):

@@ -127,6 +127,16 @@ def test_each_interval_of_equal_probability_has_one_point():
     assert not np.any(other == found)
 
 
+def test_the_design_is_saltellis():
+    design = sample_of({"x": "uniform(0,1)", "y": "uniform(2,3)"}, 16, indices=True)
+    assert design.parts == ("A", "B", "AB x", "AB y") * 16
+    a, b, x, y = (columns(design)[i::4] for i in range(4))
+    np.testing.assert_array_equal(x, np.column_stack([b[:, 0], a[:, 1]]))
+    np.testing.assert_array_equal(y, np.column_stack([a[:, 0], b[:, 1]]))
+    both = np.column_stack([a, b]) - [0, 2, 0, 2]
+    assert all(sorted((16 * one).astype(int)) == list(range(16)) for one in both.T)
+
+
 def test_the_indices_of_ishigamis_function():
     table = ishigami_table(8192)
     found = sobol_indices(table, "f")

@@ -121,11 +121,11 @@ class Search:
         if patterned(self._compared()):
             # It may be where one pulse of the run lies on another one of the data. Both ends are
             # judged by their likelihood: weights of its own make every end look good.
-            ends = [(self._unlikely(), self.x, self.sigma, self.converged)]
+            ends = [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
             self.x = self._grown()
             if np.isfinite(self._values(self.x)).all():
                 self._settle()
-                ends += [(self._unlikely(), self.x, self.sigma, self.converged)]
+                ends += [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
             _, self.x, self.sigma, self.converged = min(ends, key=lambda one: one[0])
 
     def _settle(self) -> None:
@@ -146,7 +146,7 @@ class Search:
         for share in _SHARES:
             trials = [one for one in (trial.until(share) for trial in self.trials) if one.data]
             if sum(len(one.t) for trial in trials for one in trial.data) > len(x):
-                part = Search(trials, self.free, self._told)
+                part = Search(trials, self.free, self._count_run)
                 part.x, part.low = x, np.maximum(self.low, x - _REACH)
                 part.high = np.minimum(self.high, x + _REACH)
                 if np.isfinite(part._values(x)).all():
@@ -154,7 +154,7 @@ class Search:
                     x = part.x
         return x
 
-    def _unlikely(self) -> float:
+    def _negative_log_likelihood(self) -> float:
         """Return the negative logarithm of the data's likelihood at x, less a constant."""
         squares = ((self.measured - self._values(self.x)) / self.sigma) ** 2
         return float(np.sum(np.log(self.sigma) + 0.5 * squares))
@@ -230,10 +230,10 @@ class Search:
         changes, parts = self._changes(x), []
         for trial in self.trials:
             parts.append(trial.predict(changes))
-            self._told(0, self._misfit)
+            self._count_run(0, self._misfit)
         return np.concatenate(parts)
 
-    def _told(self, _: int, misfit: float) -> None:
+    def _count_run(self, _: int, misfit: float) -> None:
         """Count a run, of this search or of a part of it."""
         self.count += 1
         if self._progress is not None:
