@@ -45,7 +45,10 @@ def test_on_a_plane(plate: str, method: str) -> None:
     """kappa times the volume of the cap, however the plane is divided."""
     shell = Shell(*PLATES[plate]())
     for depth in (0.01, 0.1, 0.5, 0.9):
-        force, energy, slope = total(shell, [0.013, 0.021, 1 - depth], method=method)
+        center = [0.013, 0.021, 1 - depth]
+        force, energy, slope = total(shell, center, method=method)
+        rows, _ = foundation(shell, center, method=method)
+        assert rows[2].max() == pytest.approx(depth, abs=1e-12)
         exact = plane_force(1.0, depth)
         assert force == pytest.approx([0, 0, exact], rel=1e-12, abs=1e-12 * exact)
         stored = np.pi * (depth**3 / 3 - depth**4 / 12)

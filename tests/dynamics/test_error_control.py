@@ -110,6 +110,15 @@ for integrator in (sp.Adaptive(), sp.Implicit()):
 """
 
 
+@both
+def test_a_step_cut_short_leaves_the_next_as_long_as_it_was_to_be(integrator) -> None:
+    """An arm swings; the periods of a held torque end steps, and each costs no more than one."""
+    scene, periods = sp.Scene(models.arm()), 40
+    hold = {"controller": lambda *_: np.zeros(3), "control_dt": 2.0 / periods}
+    free, held = (run(scene, integrator, models.ARM_Q, None, 2.0, **more) for more in ({}, hold))
+    assert held.stats.steps <= free.stats.steps + periods
+
+
 def test_round_off_of_time_does_not_hang_the_run() -> None:
     """0.09 + (0.42 - 0.09) < 0.42, and 1e6 + k 1e-3 is off by more than 1e-9 of the period."""
     said = python(FAR.format(root=str(ROOT)))

@@ -1,5 +1,6 @@
 """A target on a path: limits of its motion, curves through points, and arms that follow exactly."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -225,6 +226,20 @@ def test_a_path_on_a_turning_carrier_is_followed_exactly() -> None:
         pin.utils.rotate("z", angle) @ one for angle, one in zip(rows.q[:, 0], targets, strict=True)
     ]
     np.testing.assert_allclose(places, turned, atol=2e-6)
+
+
+def test_the_push_turns_with_the_normal_along_a_piece() -> None:
+    """Over a corner of a ball, from one axis to the other: as much along one as along the other."""
+    model, shell = models.empty(0.0), sp.Shell.from_geometry(coal.Sphere(0.4))
+    models.add_body(model, "tip", pin.JointModelTranslation())
+    path = [[0.4, 0.0, 0.0], [0.0, 0.4, 0.0]]
+    push = sp.CartesianImpedance(
+        "tip", path, 0.0, 0.0, normal_force=2.0, shell=shell, shell_frame="universe", speed=1.0
+    )
+    q, quarter = np.array([0.5, 0.0, 0.0]), 0.2 * np.pi
+    end = sp.Simulation(sp.Scene(model), sp.Adaptive(1e-9)).run(q, None, quarter, push).v[-1]
+    # The integral of 2 N times the normal, of a body of 1 kg.
+    np.testing.assert_allclose(end, [-0.8, -0.8, 0.0], rtol=1e-3, atol=1e-9)
 
 
 def test_a_path_of_one_point_and_of_one_twice() -> None:

@@ -1,5 +1,7 @@
 """A hand about a part: forces in closed form, distances, and drafts that are run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,7 +12,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
-from sphshell_pin.scenario.drafting.hand import GAP
+from sphshell_pin.scenario.drafting.hand import GAP, _pressed
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.part import Part
@@ -108,6 +110,19 @@ def test_torques_do_the_work_of_the_forces(tmp_path):
         )
         work = (forces * (np.array(ahead) - np.array(behind))).sum() / (2 * step)
         assert torques[k] == pytest.approx(work, abs=1e-8)
+
+
+@pytest.mark.parametrize("dense", [1.0, 1e3])
+def test_the_finger_that_presses_most_presses_as_asked(dense):
+    """Of three around a post, each presses a third of all where it weighs little."""
+    turns = 2 * np.pi / 3 * np.arange(3)
+    normals = np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1)
+    post = shell_of(Cylinder(0.02, 0.05))
+    part = Part.of(post, replace(find_material("plastic"), density=dense))
+    about = Grasp(np.zeros(3), pin.SE3.Identity(), 0.02 * normals, normals, 0 * normals, 0.0)
+    found = _pressed(about, part, 5.0, 0.8)
+    assert found.normal_forces().max() == pytest.approx(5.0, rel=1e-3)
+    assert found.forces[:, 2].sum() == pytest.approx(9.81 * part.inertia.mass, rel=1e-4)
 
 
 def test_what_is_out_of_reach_is_not_touched(tmp_path):

@@ -150,6 +150,14 @@ def test_what_would_not_work_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_robot_on_four_legs_stands(draft):
+    """Its joints give way by what they were drafted for, 0.05 rad, and it sinks by little."""
+    built = draft("solo12", "plane").built
+    result = run_well(built)
+    assert np.abs(result.q[-1, 7:] - built.q0[7:]).max() < 0.05
+    assert abs(result.q[-1, 2] - built.q0[2]) < 0.01
+
+
 def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(draft):
     with pytest.raises(SphshellError, match=r"LEG' is in the part .* hold it with --base fixed"):
         draft("solo12", BLADE, unit="mm", base="floating")

@@ -10,6 +10,7 @@ from sphshell_pin.scenario.drafting.touch_points import (
     find_touch_point,
     paths_on_surface,
     sides,
+    touch_from_outside,
     touch_points,
     touches_once,
 )
@@ -69,6 +70,22 @@ def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
     np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
     np.testing.assert_allclose(spot.center, spot.point + 0.011 * spot.normal, atol=2e-6)
+
+
+def test_an_open_part_is_touched_from_outside_wherever_it_stands():
+    """A tunnel about an axis far from the origin; its triangles face inward or outward."""
+    angles = np.linspace(0.0, np.pi, 9)
+    for turn in (1, -1):
+        rows = np.array([[0.1 * np.cos(a), 0.0, 1 + 0.1 * np.sin(a)] for a in angles[::turn]])
+        ends = np.concatenate([rows - [0, 0.1, 0], rows + [0, 0.1, 0]])
+        shell = sp.Shell(ends, [[i, i + 1, i + 10, i + 9] for i in range(8)])
+        for way in (1.0, -1.0):
+            side = np.array([0.1 * np.cos(0.2) * way, 0.0, 1 + 0.1 * np.sin(0.2)])
+            spot = touch_from_outside(shell, side, 0.01, 1e-3)
+            assert spot.normal[0] * way > 0.9
+    # Below the origin the middle is on the other side.
+    hung = sp.Shell(ends - [0, 0, 2.5], [[i, i + 1, i + 10, i + 9] for i in range(8)])
+    assert touch_from_outside(hung, np.array([0, 0, -1.4]), 0.01, 1e-3).normal[2] > 0.9
 
 
 def test_a_sphere_has_room_in_a_groove():
