@@ -162,10 +162,11 @@ FILES = """sphshell_pin/_built_against.py sphshell_pin/_core.pyi sphshell_pin/py
     sphshell_pin/robots/urdf/ball.urdf sphshell_pin/robots/meshes/gear_20.stl
     sphshell_pin/scenario/drafting/draft.template sphshell_pin/scenarios/sphere_on_shell.toml
     sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt pytest_sphshell_pin/__init__.py
-    sphshell_pin-1.0.dist-info/METADATA"""
+    sphshell_pin/no_display/libGL.so.1 sphshell_pin-1.0.dist-info/METADATA"""
 GOOD = {CORE: b"\0$ORIGIN/../cmeel.prefix/lib\0", **dict.fromkeys(FILES.split(), b"")}
 BAD = [
     ("sphshell_pin.libs/libboost_python311-1.so.1.90.0", b"", "outside"),
+    ("sphshell_pin/libX11.so.6", b"", "libX11.so.6 does not belong"),
     ("sphshell_pin/cpp/shell/bvh.cpp", b"", "bvh.cpp does not belong"),
     ("sphshell_pin/tests/test_a.py", b"", "does not belong"),
     ("sphshell_pin/benchmarks/growth.py", b"", "does not belong"),
