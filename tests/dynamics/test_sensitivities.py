@@ -172,6 +172,17 @@ def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
 
 
+def test_torques_that_follow_a_force() -> None:
+    """What a held state's force makes of a moved sphere and a moved shell."""
+    scene = models.on_shell(models.slider(9.81, 0.3), models.plate(1.0), HUNT)
+
+    def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
+        return np.array([-0.2 * contacts.normal_force.sum()])
+
+    case = Case(scene, [R + 0.004], [-0.3], 0.06, controller=tau)
+    case.check(["ball.sphere.offset", "ball.placement"], bounces=1)
+
+
 def test_a_joint_that_meets_its_stop() -> None:
     stop = sp.JointLimits(-0.1, 0.1, sp.HuntCrossleyLaw(2e5, 1.5, 0.3))
     joints = sp.JointComponents(limits={"ball_joint": stop})
