@@ -40,6 +40,12 @@ def tetrahedron(scale=1.0, at=(0.0, 0.0, 0.0)):
     return points, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
 
 
+def star(corners, rng):
+    """Return a random star-shaped polygon (n, 2), counter-clockwise."""
+    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.3, 0.3, corners)) / corners
+    return rng.uniform(0.3, 1.0, corners)[:, None] * np.c_[np.cos(angle), np.sin(angle)]
+
+
 def joined(*parts):
     """Return several (vertices, elements) as one list of polygons."""
     vertices, polygons, before = [], [], 0
@@ -67,6 +73,13 @@ def by_place(surface: CleanedSurface, wound=True):
         else:
             out.append(tuple(sorted(places)))
     return sorted(out)
+
+
+def expect(health, *said, **figures):
+    """Check figures of a report on a surface's health, and parts of sentences that it has."""
+    assert {name: getattr(health, name) for name in figures} == pytest.approx(figures)
+    sentences = " ".join((*health.repairs, *health.problems, *health.notes))
+    assert [part for part in said if part not in sentences] == []
 
 
 def signed_volume(surface):

@@ -13,6 +13,7 @@ from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell import clean
 
 from ..oracle.ear_clipping import clip_ears
+from .surfaces import star as star_of
 
 
 def on_circle(radius, angle):
@@ -20,9 +21,7 @@ def on_circle(radius, angle):
 
 
 def star(count):
-    rng = np.random.default_rng(count)
-    angle = 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
-    return on_circle(rng.uniform(0.3, 1.0, count), angle)
+    return star_of(count, np.random.default_rng(count))
 
 
 def gear(count):

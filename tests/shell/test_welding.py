@@ -9,32 +9,17 @@ from sphshell_pin import _core
 from sphshell_pin.errors import InvalidShell
 from sphshell_pin.shell import clean
 
-from .surfaces import CUBE, CUBE_QUADS, areas, by_place, joined, plate, tetrahedron
-
-
-def test_soup_becomes_one_surface():
-    vertices, quads = plate(6)
-    surface = clean(vertices[quads].reshape(-1, 3), np.arange(4 * len(quads)).reshape(-1, 4))
-    assert len(surface.vertices) == 49
-    assert surface.health.welded_vertices == 4 * 36 - 49
-    assert surface.health.boundary_edges == 24
-    assert "merged" in surface.health.repairs[0]
+from .surfaces import CUBE, CUBE_QUADS, areas, by_place, expect, joined, plate, tetrahedron
 
 
 @pytest.mark.parametrize(("factor", "merged"), [(0.99, True), (1.01, False)])
 def test_tolerance_is_a_share_of_the_box(factor, merged):
     vertices, quads = plate(2)
     vertices = vertices * 3.0
-    tolerance = 1e-7 * np.linalg.norm([3.0, 3.0])
-    shift = np.array([0.0, 0.0, factor * tolerance])
-    both, polygons = joined((vertices, quads), (vertices + shift + [0, 3.0, 0], quads))
-    surface = clean(both, polygons)
-    # The box is longer now: the same distance against the new diagonal.
-    assert surface.health.weld_tolerance == pytest.approx(1e-7 * np.linalg.norm([3.0, 6.0]))
-    assert surface.health.welded_vertices == 3
-    gap = np.array([0.0, 3.0, factor * surface.health.weld_tolerance])
-    apart, polygons = joined((vertices, quads), (vertices + gap, quads))
-    assert (clean(apart, polygons).health.welded_vertices == 3) == merged
+    tolerance = 1e-7 * np.linalg.norm([3.0, 6.0])
+    apart = vertices + [0.0, 3.0, factor * tolerance]
+    health = clean(*joined((vertices, quads), (apart, quads))).health
+    expect(health, weld_tolerance=tolerance, welded_vertices=3 * merged)
 
 
 @settings(max_examples=60, deadline=None)
@@ -62,31 +47,18 @@ def test_first_position_is_kept_exactly():
     assert (surface.vertices == points[0]).all(axis=1).any()
 
 
-@pytest.mark.parametrize("offset", [0.0, 1e-12, 1e3])
-def test_a_box_far_from_the_origin_is_welded_alike(offset):
-    vertices, quads = plate(3)
-    soup = vertices[quads].reshape(-1, 3) + offset
-    assert clean(soup, np.arange(36).reshape(-1, 4)).health.vertices == 16
-
-
 def test_unused_vertices_do_not_widen_the_box():
     vertices, triangles = tetrahedron()
     far = np.concatenate([vertices, [[1e6, 0, 0], [1e6, 1, 0]]])
-    health = clean(far, triangles).health
-    assert health.unused_vertices == 2
-    assert health.size == pytest.approx(np.sqrt(3.0))
-    assert health.vertices + health.unused_vertices + health.welded_vertices == len(far)
+    expect(clean(far, triangles).health, unused_vertices=2, vertices=4, size=np.sqrt(3.0))
 
 
 def test_elements_without_area_are_dropped_and_counted():
     vertices, triangles = tetrahedron()
     vertices = np.concatenate([vertices, [[2.0, 0, 0], [3.0, 0, 0], [0.5, 0.0, 0.0]]])
-    more = np.concatenate([triangles, [[0, 1, 4], [1, 1, 2], [4, 5, 0]]])
-    surface = clean(vertices, more)
-    assert surface.health.degenerate_elements == 3
-    assert surface.health.elements == 4
+    surface = clean(vertices, np.concatenate([triangles, [[0, 1, 4], [1, 1, 2], [4, 5, 0]]]))
+    expect(surface.health, degenerate_elements=3, elements=4, is_closed=True)
     assert surface.source_element.tolist() == [0, 1, 2, 3]
-    assert surface.health.is_closed
 
 
 @pytest.mark.parametrize(("height", "kept"), [(1.1e-12, True), (0.9e-12, False), (0.0, False)])
@@ -99,13 +71,8 @@ def test_limit_of_area_is_against_the_longest_edge(height, kept):
 
 
 def test_duplicates_of_both_windings_are_dropped():
-    extra = [[3, 2, 0, 1], [2, 3, 1, 0], [0, 4, 5, 1]]
-    health = clean(CUBE, CUBE_QUADS + extra).health
-    assert health.duplicate_elements == 3
-    assert health.opposite_duplicates == 1
-    assert health.elements == 6
-    assert health.degenerate_elements == 0
-    assert health.is_closed
+    health = clean(CUBE, [*CUBE_QUADS, [3, 2, 0, 1], [2, 3, 1, 0], [0, 4, 5, 1]]).health
+    expect(health, duplicate_elements=3, opposite_duplicates=1, elements=6, is_closed=True)
 
 
 def test_repeated_corners_make_smaller_elements():
@@ -127,3 +94,11 @@ def test_nothing_left_is_an_error():
         clean(points, [[0, 1, 2], [1, 2, 3]])
     with pytest.raises(InvalidShell, match="one place"):
         clean(np.ones((3, 3)), [[0, 1, 2]])
+
+
+@pytest.mark.parametrize("offset", [0.0, 1e-12, 1e3])
+def test_soup_becomes_one_surface_wherever_it_is(offset):
+    vertices, quads = plate(6)
+    soup = vertices[quads].reshape(-1, 3) + offset
+    health = clean(soup, np.arange(4 * len(quads)).reshape(-1, 4)).health
+    expect(health, "merged", vertices=49, welded_vertices=4 * 36 - 49, boundary_edges=24)
