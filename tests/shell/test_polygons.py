@@ -22,7 +22,7 @@ def ring(points):
 def test_warped_quads_are_split_and_reported(lift, split):
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, lift], [0, 1, 0]])
     surface = clean(points, [[0, 1, 2, 3]])
-    expect(surface.health, quads=1 - split, warped_quads=split)
+    expect(surface.health, quads=1 - split, warped_quads=int(split))
     assert (surface.source_element == 0).all()
     if split:
         assert surface.health.largest_warp == pytest.approx(lift / 4, rel=0.05)
