@@ -19,6 +19,16 @@ CUBE, _QUADS = meshes.cube(quads=True)
 CUBE = CUBE + 0.5
 CUBE_QUADS = _QUADS.tolist()
 
+TRIANGLE = {
+    "obj": "v 2 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "off": "OFF\n3 1 0\n2 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    "shl": "3 1 1.0\n2 0 0\n1 0 0\n0 1 0\n3 1 2 3\n",
+    "ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "2 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+}
+"""As files have it, by suffix."""
+
 
 def surface_file(name: str) -> Path:
     """Return the path of other people's surface `name`, or skip the test that needs it."""
