@@ -86,18 +86,8 @@ def force_errors(shell: Shell, known: Known, count: int = 200) -> Array:
     return np.array(errors)
 
 
-def rms(values: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(values**2)))
-
-
 def stated_and_measured(shell: Shell) -> tuple[float, float, bool]:
     """Chord errors [m] that the reader says were asked for and found, and whether it held."""
     (note,) = [note for note in shell.health.notes if note.startswith("chord error")]
     stated, measured = re.findall(r"([\d.e+-]+) m (?:stated|measured)", note)
     return float(stated), float(measured), note.endswith("held")
-
-
-def order(errors: tuple[float, float], chords: tuple[float, float]) -> float:
-    """Order of convergence in the length of the elements, whose square the chord error is."""
-    return float(2.0 * np.log(errors[0] / errors[1]) / np.log(chords[0] / chords[1]))
