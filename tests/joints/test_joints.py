@@ -23,16 +23,16 @@ PARTS = [
     solids.pocket(64.0, 0.49, 0.46),
     solids.shaft(16.0, 4.5, 5.8e-3),
     solids.ring(69.0, 6.5),
-    solids.dome(17.0, 120.0),
+    solids.dome(17.0),
     solids.cones(30.0, 0.3),
     solids.cones(25.0, 0.02),
     solids.cones(36.0, 0.4, 1.9),
     solids.d_shaft(20.0, 0.1),
     solids.d_shaft(17.0, 0.066),
     solids.slot(40.0, 5.0),
-    solids.bar(40.0, (1.0, 3.0), 0.0),
-    solids.bar(63.0, (0.12, 0.3), 0.0),
-    solids.bar(27.0, (0.5, 2.2), 8.6e-4),
+    solids.bar(40.0, 1.0, 3.0),
+    solids.bar(63.0, 0.12, 0.3),
+    solids.bar(27.0, 0.5, 2.2, 8.6e-4),
 ]
 
 
