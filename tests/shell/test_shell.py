@@ -7,8 +7,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidParameter, InvalidShell
-from sphshell_pin.shell import Shell
+from tests import meshes
+from tests.contact.helpers import force_sum
 
 from .surfaces import CUBE, CUBE_QUADS, expect, joined, plate
 
@@ -85,6 +87,8 @@ def test_transformed(shell):
     assert smaller.size == smaller.health.size == pytest.approx(0.1 * shell.size)
 
 
+# The search tree is in single precision.
+TOO_LARGE = (-46, -45, -38, -20, -13, 15, 20, 38, 39, 100)
 WRONG = [
     ({"vertices": CUBE[:, :2]}, r"\(8, 2\)"),
     ({"vertices": CUBE[:2]}, "at least 3 vertices"),
@@ -108,6 +112,7 @@ WRONG = [
     ({"normals": np.zeros((7, 3))}, r"\(7, 3\)"),
     ({"normals": "up"}, "numbers"),
     ({"side": "top"}, "both, outside, inside"),
+    *(({"vertices": 10.0**k * CUBE}, "m: it must be between 1e-12") for k in TOO_LARGE),
     *(({"crease_angle": angle}, "crease_angle") for angle in (-0.1, 4.0, np.nan, "thirty")),
 ]
 
@@ -151,3 +156,26 @@ def test_edges_and_patches_come_from_the_core(shell):
     flat = Shell(*plate(2))
     assert np.bincount(flat.edge_class).tolist() == [4, 0, 8]
     assert flat.num_patches == 1
+
+
+def wavy(scale: float) -> Shell:
+    vertices, elements = meshes.grid_plate(11, 11, size=2.0, quads=True)
+    x, y, _ = vertices.T
+    vertices[:, 2] = 0.2 * np.sin(3 * x) * np.cos(2 * y)
+    along_x, along_y = 0.6 * np.cos(3 * x) * np.cos(2 * y), -0.4 * np.sin(3 * x) * np.sin(2 * y)
+    normals = np.stack([-along_x, -along_y, np.ones_like(x)], axis=1)
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    return Shell(scale * vertices, elements, normals=normals)
+
+
+@pytest.mark.parametrize("exponent", [-12, -9, -3, 3, 9, 14])
+def test_sizes_within_range_find_the_same(exponent: int) -> None:
+    """The contacts are those of the surface of one meter, in its units."""
+    scale, rng = 10.0**exponent, np.random.default_rng(0)
+    here, there, touched = wavy(1.0), wavy(scale), 0
+    for _ in range(300):
+        center, radius = rng.uniform(-1, 1, 3), rng.uniform(0.05, 1.2)
+        a, b = here.contacts(center, radius), there.contacts(scale * center, scale * radius)
+        assert force_sum(b) / scale**1.5 == pytest.approx(force_sum(a), rel=1e-6, abs=1e-8)
+        touched += len(a)
+    assert touched > 100
