@@ -6,6 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound
+from tests import models
 from tests.adapters.test_crocoddyl import arm_on_moving_plate, free_ball, with_bristles
 
 casadi = pytest.importorskip("casadi")
@@ -85,21 +86,17 @@ def test_values_are_those_of_the_scene():
 
 def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
     """Of all postures in which an arm presses with 3 N, the one with the least torques."""
-    model = pin.Model()
-    joint = 0
-    for k in range(2):
-        at = pin.SE3(np.eye(3), np.array([0.3 if k else 0.0, 0.0, 0.0]))
-        joint = model.addJoint(joint, pin.JointModelRY(), at, f"arm{k}")
-        half = pin.SE3(np.eye(3), np.array([0.15, 0.0, 0.0]))
-        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.03), half)
-    tip = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
-    model.addFrame(pin.Frame("tip", joint, tip, pin.FrameType.OP_FRAME))
+    model, joint, reach = models.empty(), 0, np.array([0.3, 0.0, 0.0])
+    lump = pin.Inertia(0.5, reach / 2, np.diag([2e-4, 2e-4, 2e-4]))
+    end = pin.SE3(np.eye(3), reach)
+    for name, place in (("arm", None), ("tip", end)):
+        more = {"placement": place, "inertia": lump, "frame": end}
+        joint = models.add_body(model, name, pin.JointModelRY(), joint, **more)
     scene = sp.Scene(model)
     law = sp.ImpactLaw(2e5, 1.5)
-    table = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
     below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.2]))
-    scene.add_contact(sp.Sphere(0.02, "tip"), table, placement=below, law=law, name="touch")
-    depth = law.depth_at(3.0)
+    table = {"shell": models.square(), "placement": below, "law": law, "name": "touch"}
+    scene.add_contact(sp.Sphere(0.02, "tip"), **table)
     f = ForwardDynamics(scene)
     q, tau = casadi.MX.sym("q", 2), casadi.MX.sym("tau", 2)
     height = -0.3 * casadi.sin(q[0]) - 0.3 * casadi.sin(q[0] + q[1])
@@ -108,24 +105,18 @@ def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
         "f": casadi.sumsqr(tau),
         "g": casadi.vertcat(f(q, np.zeros(2), tau), height),
     }
-    quiet = {
-        "print_time": False,
-        "ipopt": {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10},
-    }
-    solver = casadi.nlpsol("press", "ipopt", problem, quiet)
-    wanted = [0.0, 0.0, -0.2 + 0.02 - depth]
-    first = np.array([0.0, 0.6, -1.0, 0.0])
-    found = flat(solver(x0=first, lbg=wanted, ubg=wanted)["x"])
+    ipopt = {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10}
+    solver = casadi.nlpsol("press", "ipopt", problem, {"print_time": False, "ipopt": ipopt})
+    wanted = [0.0, 0.0, -0.2 + 0.02 - law.depth_at(3.0)]
+    found = flat(solver(x0=[0.0, 0.6, -1.0, 0.0], lbg=wanted, ubg=wanted)["x"])
     assert solver.stats()["success"]
     contacts = scene.contacts(found[:2])
     assert contacts.normal_force.sum() == pytest.approx(3.0, rel=1e-6)
     # Held by gravity and the press alone, by Pinocchio.
-    data = model.createData()
+    data, axes = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     weight = pin.computeGeneralizedGravity(model, data, found[:2])
-    jacobian = pin.computeFrameJacobian(
-        model, data, found[:2], model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    )
-    np.testing.assert_allclose(found[2:], weight - 3.0 * jacobian[2], atol=1e-5)
+    lever = pin.computeFrameJacobian(model, data, found[:2], model.getFrameId("tip"), axes)
+    np.testing.assert_allclose(found[2:], weight - 3.0 * lever[2], atol=1e-5)
 
 
 @pytest.mark.parametrize(
