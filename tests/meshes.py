@@ -33,6 +33,17 @@ def grid_plate(rows: int = 1, columns: int = 1, size: float = 1.0, quads: bool =
     return vertices, _split(cells, np.zeros(len(cells), dtype=bool))
 
 
+def ribbon(rails: ArrayLike, closed: bool = False) -> Mesh:
+    """Rows of quads between rails (k, n, 3), counter-clockwise where the next is above; maybe
+    closed along the rails."""
+    points = np.asarray(rails, float)
+    number = np.arange(points.size // 3).reshape(points.shape[:2])
+    after = np.roll(number, -1, axis=1)
+    quads = np.stack([number[:-1], after[:-1], after[1:], number[1:]], axis=-1)
+    quads = quads if closed else quads[:, :-1]
+    return points.reshape(-1, 3), quads.reshape(-1, 4).astype(np.int32)
+
+
 def random_plate(elements, seed=0, size=1.0, jitter=0.45, slivers=True):
     """Plate z = 0 of about `elements` triangles: jittered grid, random diagonals, slivers.
 

@@ -6,7 +6,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound
-from tests.adapters.test_crocoddyl import arm_on_moving_plate, free_ball
+from tests import models
+from tests.adapters.test_crocoddyl import arm_on_moving_plate, free_ball, with_bristles
 
 casadi = pytest.importorskip("casadi")
 
@@ -21,7 +22,7 @@ def flat(matrix) -> np.ndarray:
     return np.array(matrix).ravel()
 
 
-def columns(f, inputs: list[np.ndarray], k: int, step: float) -> np.ndarray:
+def columns(f, inputs: list[np.ndarray], k: int, steps: np.ndarray) -> np.ndarray:
     """Return central differences of order 4 of the outputs, one behind the other, by input k."""
 
     def at(e):
@@ -29,8 +30,7 @@ def columns(f, inputs: list[np.ndarray], k: int, step: float) -> np.ndarray:
         return np.concatenate([flat(out) for out in f.call(moved)])
 
     out = [
-        (8 * (at(e) - at(-e)) - (at(2 * e) - at(-2 * e))) / (12 * step)
-        for e in step * np.eye(len(inputs[k]))
+        (8 * (at(e) - at(-e)) - (at(2 * e) - at(-2 * e))) / (12 * e.max()) for e in np.diag(steps)
     ]
     return np.transpose(out)
 
@@ -50,35 +50,22 @@ def test_jacobians_are_those_of_differences(case, kind, parameters):
     nq, nv = scene.model.nq, scene.model.nv
     # A start apart from q, so that the chart of CasADi's q is seen.
     q0 = pin.integrate(scene.model, x[:nq], np.linspace(-0.3, 0.4, nv))
-    q = pin.difference(scene.model, q0, x[:nq])
     if kind == "dynamics":
         f = ForwardDynamics(scene, q0, parameters=parameters)
     else:
         integrator = sp.SemiImplicitEuler(1e-4) if kind == "euler" else sp.RungeKutta4(1e-4)
         f = Step(sp.Simulation(scene, integrator), q0, parameters=parameters)
-    inputs = [q, x[nq:], np.linspace(-1.0, 1.0, nv)]
+    inputs = [pin.difference(scene.model, q0, x[:nq]), x[nq:], np.linspace(-1.0, 1.0, nv)]
+    steps = [np.full(nv, step) for step in (1e-6, 1e-6, 1e-2)]
     if parameters:
         inputs.append(np.array([2.1e6, 0.02001]))
-    for k, _ in enumerate(inputs):
-        step = (1e-6, 1e-6, 1e-2, 1e-6)[k]
-        expected = columns(f, inputs, k, step) if k != 3 else by_parameters(f, inputs)
-        got = jacobian(f, inputs, k)
+        steps.append(1e-6 * inputs[3])
+    for k, step in enumerate(steps):
+        expected, got = columns(f, inputs, k, step), jacobian(f, inputs, k)
         largest = np.abs(expected).max(axis=0)
         assert largest.any()
-        assert (
-            np.abs(got - expected).max(axis=0) <= 2e-6 * np.maximum(largest, 1e-6 * largest.max())
-        ).all(), (kind, k)
-
-
-def by_parameters(f, inputs: list[np.ndarray]) -> np.ndarray:
-    """Return differences by p, whose numbers are of several sizes."""
-    sizes = inputs[3].copy()
-
-    class Scaled:
-        def call(self, arguments):
-            return f.call([*arguments[:3], arguments[3] * sizes])
-
-    return columns(Scaled(), [*inputs[:3], np.ones(len(sizes))], 3, 1e-6) / sizes
+        off = np.abs(got - expected).max(axis=0)
+        assert (off <= 2e-6 * np.maximum(largest, 1e-6 * largest.max())).all(), (kind, k)
 
 
 def test_values_are_those_of_the_scene():
@@ -99,21 +86,17 @@ def test_values_are_those_of_the_scene():
 
 def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
     """Of all postures in which an arm presses with 3 N, the one with the least torques."""
-    model = pin.Model()
-    joint = 0
-    for k in range(2):
-        at = pin.SE3(np.eye(3), np.array([0.3 if k else 0.0, 0.0, 0.0]))
-        joint = model.addJoint(joint, pin.JointModelRY(), at, f"arm{k}")
-        half = pin.SE3(np.eye(3), np.array([0.15, 0.0, 0.0]))
-        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.03), half)
-    tip = pin.SE3(np.eye(3), np.array([0.3, 0.0, 0.0]))
-    model.addFrame(pin.Frame("tip", joint, tip, pin.FrameType.OP_FRAME))
+    model, joint, reach = models.empty(), 0, np.array([0.3, 0.0, 0.0])
+    lump = pin.Inertia(0.5, reach / 2, np.diag([2e-4, 2e-4, 2e-4]))
+    end = pin.SE3(np.eye(3), reach)
+    for name, place in (("arm", None), ("tip", end)):
+        more = {"placement": place, "inertia": lump, "frame": end}
+        joint = models.add_body(model, name, pin.JointModelRY(), joint, **more)
     scene = sp.Scene(model)
     law = sp.ImpactLaw(2e5, 1.5)
-    table = sp.Shell([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2, 3]])
     below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.2]))
-    scene.add_contact(sp.Sphere(0.02, "tip"), table, placement=below, law=law, name="touch")
-    depth = law.depth_at(3.0)
+    table = {"shell": models.square(), "placement": below, "law": law, "name": "touch"}
+    scene.add_contact(sp.Sphere(0.02, "tip"), **table)
     f = ForwardDynamics(scene)
     q, tau = casadi.MX.sym("q", 2), casadi.MX.sym("tau", 2)
     height = -0.3 * casadi.sin(q[0]) - 0.3 * casadi.sin(q[0] + q[1])
@@ -122,41 +105,38 @@ def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
         "f": casadi.sumsqr(tau),
         "g": casadi.vertcat(f(q, np.zeros(2), tau), height),
     }
-    quiet = {
-        "print_time": False,
-        "ipopt": {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10},
-    }
-    solver = casadi.nlpsol("press", "ipopt", problem, quiet)
-    wanted = [0.0, 0.0, -0.2 + 0.02 - depth]
-    first = np.array([0.0, 0.6, -1.0, 0.0])
-    found = flat(solver(x0=first, lbg=wanted, ubg=wanted)["x"])
+    ipopt = {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10}
+    solver = casadi.nlpsol("press", "ipopt", problem, {"print_time": False, "ipopt": ipopt})
+    wanted = [0.0, 0.0, -0.2 + 0.02 - law.depth_at(3.0)]
+    found = flat(solver(x0=[0.0, 0.6, -1.0, 0.0], lbg=wanted, ubg=wanted)["x"])
     assert solver.stats()["success"]
     contacts = scene.contacts(found[:2])
     assert contacts.normal_force.sum() == pytest.approx(3.0, rel=1e-6)
     # Held by gravity and the press alone, by Pinocchio.
-    data = model.createData()
+    data, axes = model.createData(), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     weight = pin.computeGeneralizedGravity(model, data, found[:2])
-    jacobian = pin.computeFrameJacobian(
-        model, data, found[:2], model.getFrameId("tip"), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    )
-    np.testing.assert_allclose(found[2:], weight - 3.0 * jacobian[2], atol=1e-5)
+    lever = pin.computeFrameJacobian(model, data, found[:2], model.getFrameId("tip"), axes)
+    np.testing.assert_allclose(found[2:], weight - 3.0 * lever[2], atol=1e-5)
 
 
-def test_wrong_arguments_get_a_sentence():
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda s: ForwardDynamics(s, parameters=["touch.law.stifness"]), r"touch\.law\.stiffness"),
+        (lambda s: ForwardDynamics(s, parameters=["touch.sphere.offset"]), "one number"),
+        (lambda s: Step(sp.Simulation(s, sp.Adaptive())), "fixed step"),
+        (Step, r"must be a sphshell_pin\.Simulation"),
+        (lambda s: ForwardDynamics(with_bristles(s)), "bristles in the friction of touch"),
+    ],
+)
+def test_wrong_arguments_get_a_sentence(call, said):
+    with pytest.raises((InvalidParameter, NameNotFound), match=said):
+        call(free_ball()[0])
+
+
+def test_bristles_may_be_taken_without_their_history():
     scene, _ = free_ball()
-    with pytest.raises(NameNotFound, match=r"touch\.law\.stiffness"):
-        ForwardDynamics(scene, parameters=["touch.law.stifness"])
-    with pytest.raises(NameNotFound, match="one number"):
-        ForwardDynamics(scene, parameters=["touch.sphere.offset"])
-    with pytest.raises(InvalidParameter, match="fixed step"):
-        Step(sp.Simulation(scene, sp.Adaptive()))
-    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
-        Step(scene)
-    scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
-    with pytest.raises(InvalidParameter, match="bristles in the friction of touch"):
-        ForwardDynamics(scene)
     q0 = scene.neutral
     q0[2] = 0.02 - 2e-4
-    loose = ForwardDynamics(scene, q0, without_history=True)
-    at_rest = flat(loose(np.zeros(6), np.zeros(6), np.zeros(6)))
-    assert at_rest[2] > 0.0
+    loose = ForwardDynamics(with_bristles(scene), q0, without_history=True)
+    assert flat(loose(np.zeros(6), np.zeros(6), np.zeros(6)))[2] > 0.0

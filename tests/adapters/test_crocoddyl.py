@@ -196,85 +196,63 @@ def test_forces_of_several_pairs_and_of_joints(joints):
     force = ContactForceResidual(scene, state, "wall", [0.0, 0.0, 0.0])
     costs.addCost("wall", crocoddyl.CostModelResidual(state, force), 1.0)
     model = ContactDynamics(scene, state, actuation, costs)
-    data = model.createData()
+    data, last = model.createData(), model.createData()  # of a last node
     tau = np.array([1.0, 2.0, 3.0])
     model.calc(data, x, tau)
-    contacts = scene.contacts(q, v)
-    assert sorted(contacts.pair) == [0, 1]
-    for name, pair in (("wall", 0), ("touch", 1)):
-        row = contacts.force_world[contacts.pair == pair][0]
-        residual = data.costs.costs["world" if name == "touch" else name].residual
-        reference = np.array([1.0, 0.5, 2.0]) if name == "touch" else np.zeros(3)
-        np.testing.assert_allclose(residual.r, row - reference, rtol=1e-14)
-    last = model.createData()  # of a last node
     model.calc(last, x)
     model.calcDiff(last, x)
-    for name in ("wall", "normal", "world"):
-        found = (one.costs.costs[name].residual.r for one in (last, data))
-        np.testing.assert_array_equal(*found)
+    contacts = scene.contacts(q, v)
+    assert sorted(contacts.pair) == [0, 1]
+    for pair, name, reference in ((0, "wall", [0.0, 0.0, 0.0]), (1, "world", [1.0, 0.5, 2.0])):
+        row = contacts.force_world[contacts.pair == pair][0]
+        for one in (data, last):
+            residual = one.costs.costs[name].residual.r
+            np.testing.assert_allclose(residual, row - reference, rtol=1e-14)
     total = tau + scene.joint_forces(q, v)
     fext = scene.external_forces(q, v)
     expected = pin.aba(scene.model, scene.model.createData(), q, v, total, fext)
     np.testing.assert_allclose(data.xout, expected, rtol=1e-12)
 
 
-def test_dry_friction_of_joints_is_refused_as_bristles_are():
-    dry = sp.JointComponents(friction={"slide_joint": sp.JointFriction(1.0)})
-    scene, _ = arm_on_moving_plate(dry)
-    with pytest.raises(InvalidParameter, match="dry friction in its joints"):
-        dynamics(scene)
-
-
-def test_where_nothing_touches_forces_and_derivatives_are_zero():
+def test_a_reference_can_be_changed_and_nothing_that_touches_has_no_derivative():
     scene, x = free_ball()
-    x[2] += 0.1
-    model = dynamics(scene)
-    data = model.createData()
-    model.calc(data, x, np.zeros(model.nu))
-    model.calcDiff(data, x, np.zeros(model.nu))
-    residual = data.costs.costs["normal"].residual
-    assert residual.r[0] == -3.0
-    assert not residual.Rx.any()
-
-
-def test_a_reference_can_be_changed():
-    scene, x = arm_on_moving_plate()
     model = dynamics(scene)
     data = model.createData()
     residual = model.costs.costs["normal"].cost.residual
     assert isinstance(residual, ContactForceResidual)
     residual.reference = 1.0
-    model.calc(data, x, np.zeros(model.nu))
+    u = np.zeros(model.nu)
+    model.calc(data, x, u)
     contacts = scene.contacts(x[: scene.model.nq], x[scene.model.nq :])
-    assert data.costs.costs["normal"].residual.r[0] == contacts.normal_force.sum() - 1.0
+    found = data.costs.costs["normal"].residual
+    assert found.r[0] == contacts.normal_force.sum() - 1.0
     with pytest.raises(InvalidParameter, match="reference"):
         residual.reference = [1.0, 2.0]
+    x[2] += 0.1
+    model.calc(data, x, u)
+    model.calcDiff(data, x, u)
+    assert found.r[0] == -1.0
+    assert not found.Rx.any()
 
 
-def euler(scene, dt):
-    return crocoddyl.IntegratedActionModelEuler(dynamics(scene), dt)
+STEPS = {
+    sp.SemiImplicitEuler: lambda scene, dt: crocoddyl.IntegratedActionModelEuler(
+        dynamics(scene), dt
+    ),
+    sp.RungeKutta4: lambda scene, dt: crocoddyl.IntegratedActionModelRK(
+        dynamics(scene), crocoddyl.RKType.four, dt
+    ),
+    sp.LinearlyImplicitEuler: lambda scene, dt: ContactStep(
+        sp.Simulation(scene, sp.LinearlyImplicitEuler(dt)), *parts(scene)
+    ),
+}
 
 
-def runge_kutta(scene, dt):
-    return crocoddyl.IntegratedActionModelRK(dynamics(scene), crocoddyl.RKType.four, dt)
-
-
-def implicit(scene, dt):
-    return ContactStep(sp.Simulation(scene, sp.LinearlyImplicitEuler(dt)), *parts(scene))
-
-
-@pytest.mark.parametrize(
-    ("integrator", "wrap"),
-    [
-        (sp.SemiImplicitEuler, euler),
-        (sp.RungeKutta4, runge_kutta),
-        (sp.LinearlyImplicitEuler, implicit),
-    ],
-)
-def test_its_steps_are_those_of_a_simulation(integrator, wrap):
+@pytest.mark.parametrize("integrator", STEPS)
+def test_its_steps_are_those_of_a_simulation(integrator):
     scene, x = arm_on_moving_plate()
     dt, steps, nq = 1e-4, 50, scene.model.nq
-    model = wrap(scene, dt)
+    model = STEPS[integrator](scene, dt)
     data = model.createData()
     torque = np.array([0.1, -2.0, -1.0, 0.3, 0.2])
     result = sp.Simulation(scene, integrator(dt)).run(
@@ -294,19 +272,19 @@ def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
     scene.add_contact(sp.Sphere(0.02, "ball"), models.plate(), law=law, name="touch")
     state, actuation, _ = bare(scene)
     x0, dt, steps = np.array([0.02 + 1e-4, 0.0]), 1e-3, 60
+    at_depth = [0.0, 0.0, 0.02 - law.depth_at(5.0)]
 
     def node(last):
         costs = crocoddyl.CostModelSum(state)
-        force = ContactForceResidual(scene, state, "touch", 5.0)
-        costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1e3 if last else 1e-2)
-        place = FrameResidual(scene, state, "ball", [0.0, 0.0, 0.02 - law.depth_at(5.0)])
-        costs.addCost("place", crocoddyl.CostModelResidual(state, place), 1e6 if last else 1e2)
         rest = crocoddyl.ActivationModelWeightedQuad(np.array([0.0, 1e3 if last else 1e-2]))
-        still = crocoddyl.ResidualModelState(state)
-        costs.addCost("rest", crocoddyl.CostModelResidual(state, rest, still), 1.0)
-        if not last:
-            control = crocoddyl.ResidualModelControl(state)
-            costs.addCost("effort", crocoddyl.CostModelResidual(state, control), 1e-6)
+        for name, weight, *of in (
+            ("force", 1e3 if last else 1e-2, ContactForceResidual(scene, state, "touch", 5.0)),
+            ("place", 1e6 if last else 1e2, FrameResidual(scene, state, "ball", at_depth)),
+            ("rest", 1.0, rest, crocoddyl.ResidualModelState(state)),
+            ("effort", 0.0 if last else 1e-6, crocoddyl.ResidualModelControl(state)),
+        ):
+            if weight:
+                costs.addCost(name, crocoddyl.CostModelResidual(state, *of), weight)
         made = crocoddyl.IntegratedActionModelEuler(
             ContactDynamics(scene, state, actuation, costs), 0.0 if last else dt
         )
@@ -315,8 +293,7 @@ def test_a_solver_presses_with_a_force_within_bounds_of_its_motor():
 
     problem = crocoddyl.ShootingProblem(x0, [node(False)] * steps, node(True))
     solver = crocoddyl.SolverBoxFDDP(problem)
-    weight = np.array([9.81 * 0.5])
-    solver.solve([x0] * (steps + 1), [weight] * steps, 100)
+    solver.solve([x0] * (steps + 1), [np.array([9.81 * 0.5])] * steps, 100)
     us = np.array(solver.us)
     assert np.abs(us).max() <= 6.0 + 1e-12
     result = sp.Simulation(scene, sp.SemiImplicitEuler(dt)).run(
@@ -330,36 +307,28 @@ def test_a_step_has_the_costs_of_its_start():
     """dt times them, and without controls them, as of a last node; it then stays."""
     scene, x = arm_on_moving_plate()
     dt = 1e-3
-    whole, step = dynamics(scene), implicit(scene, dt)
+    whole, step = dynamics(scene), STEPS[sp.LinearlyImplicitEuler](scene, dt)
     u = np.linspace(-1.0, 1.0, whole.nu)
     expected, data = whole.createData(), step.createData()
     for controls, weight in (((u,), dt), ((), 1.0)):
         for model, memory in ((whole, expected), (step, data)):
             model.calc(memory, x, *controls)
             model.calcDiff(memory, x, *controls)
-        np.testing.assert_allclose(data.cost, weight * expected.cost, rtol=1e-14)
-        for name in ("Lx", "Lxx", "Lu", "Luu") if controls else ("Lx", "Lxx"):
+        for name in ("cost", "Lx", "Lxx", *(("Lu", "Luu") if controls else ())):
             got, wanted = getattr(data, name), getattr(expected, name)
             np.testing.assert_allclose(got, weight * np.array(wanted), rtol=1e-12, atol=1e-12)
     np.testing.assert_array_equal(data.xnext, x)
 
 
-def test_a_step_needs_a_fixed_length():
-    scene, _ = free_ball()
-    with pytest.raises(InvalidParameter, match=r"RungeKutta4\(dt\)"):
-        ContactStep(sp.Simulation(scene, sp.Adaptive()), *parts(scene))
-    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Simulation"):
-        ContactStep(scene, *parts(scene))
-
-
-def test_bristles_are_refused_unless_told_otherwise():
-    scene, x = free_ball()
+def with_bristles(scene):
     scene.replace_pair("touch", friction=sp.BristleFriction(0.4, 0.3, 0.01))
-    with pytest.raises(InvalidParameter, match=r"bristles in the friction of touch.*Coulomb"):
-        dynamics(scene)
-    model = ContactDynamics(scene, *bare(scene), without_history=True)
-    data = model.createData()
-    u = np.zeros(model.nu)
+    return scene
+
+
+def test_bristles_may_be_taken_without_their_history():
+    scene, x = free_ball()
+    model = ContactDynamics(with_bristles(scene), *bare(scene), without_history=True)
+    data, u = model.createData(), np.zeros(model.nu)
     model.calc(data, x, u)
     q, v = x[: scene.model.nq], x[scene.model.nq :]
     fext = scene.external_forces(q, v)
@@ -367,29 +336,47 @@ def test_bristles_are_refused_unless_told_otherwise():
     np.testing.assert_allclose(data.xout, expected, rtol=1e-9)
 
 
-def test_wrong_arguments_get_a_sentence():
-    scene, _ = free_ball()
-    other, _ = arm_on_moving_plate()
+def with_cost(scene, name, residual):
+    """Return dynamics whose costs have a residual, made for their state."""
     state, actuation, costs = bare(scene)
-    with pytest.raises(InvalidParameter, match=r"crocoddyl.StateMultibody\(scene.model\)"):
-        ContactDynamics(other, state, actuation, costs)
-    with pytest.raises(InvalidParameter, match=r"must be a sphshell_pin\.Scene"):
-        ContactDynamics(scene.model, state, actuation, costs)
-    with pytest.raises(NameNotFound, match="touch"):
-        ContactForceResidual(scene, state, "tuch", 1.0)
-    with pytest.raises(FrameNotFound, match="ball"):
-        FrameResidual(scene, state, "bal", [0.0, 0.0, 0.0])
-    residual = crocoddyl.ResidualModelFrameTranslation(state, 1, np.zeros(3))
-    costs.addCost("place", crocoddyl.CostModelResidual(state, residual), 1.0)
-    words = r"place.*ResidualModelFrameTranslation.*FrameResidual"
-    with pytest.raises(InvalidParameter, match=words):
-        ContactDynamics(scene, state, actuation, costs)
-    # A force of another scene.
-    state, actuation, costs = bare(scene)
-    force = ContactForceResidual(free_ball()[0], state, "touch", 1.0)
-    costs.addCost("force", crocoddyl.CostModelResidual(state, force), 1.0)
-    with pytest.raises(InvalidParameter, match=r"'force'.*same scene"):
-        ContactDynamics(scene, state, actuation, costs)
+    costs.addCost(name, crocoddyl.CostModelResidual(state, residual(state)), 1.0)
+    return ContactDynamics(scene, state, actuation, costs)
+
+
+DRY = sp.JointComponents(friction={"slide_joint": sp.JointFriction(1.0)})
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda s: dynamics(arm_on_moving_plate(DRY)[0]), "dry friction in its joints"),
+        (lambda s: dynamics(with_bristles(s)), r"bristles in the friction of touch.*Coulomb"),
+        (lambda s: ContactStep(sp.Simulation(s, sp.Adaptive()), *parts(s)), r"RungeKutta4\(dt\)"),
+        (lambda s: ContactStep(s, *parts(s)), r"must be a sphshell_pin\.Simulation"),
+        (
+            lambda s: ContactDynamics(arm_on_moving_plate()[0], *bare(s)),
+            r"crocoddyl.StateMultibody\(scene.model\)",
+        ),
+        (lambda s: ContactDynamics(s.model, *bare(s)), r"must be a sphshell_pin\.Scene"),
+        (lambda s: ContactForceResidual(s, bare(s)[0], "tuch", 1.0), "touch"),
+        (lambda s: FrameResidual(s, bare(s)[0], "bal", [0.0, 0.0, 0.0]), "ball"),
+        (
+            lambda s: with_cost(
+                s, "place", lambda x: crocoddyl.ResidualModelFrameTranslation(x, 1, np.zeros(3))
+            ),
+            r"place.*ResidualModelFrameTranslation.*FrameResidual",
+        ),
+        (
+            lambda s: with_cost(
+                s, "force", lambda x: ContactForceResidual(free_ball()[0], x, "touch", 1.0)
+            ),
+            r"'force'.*same scene",
+        ),
+    ],
+)
+def test_wrong_arguments_get_a_sentence(call, said):
+    with pytest.raises((InvalidParameter, FrameNotFound, NameNotFound), match=said):
+        call(free_ball()[0])
 
 
 @pytest.mark.parametrize("package", ["crocoddyl", "casadi"])

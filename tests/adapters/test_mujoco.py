@@ -1,6 +1,7 @@
 """Contacts in MuJoCo's steps: against the scene's own forces and motions, energy and momentum."""
 
-import threading
+import itertools
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pinocchio as pin
@@ -48,39 +49,30 @@ def test_a_panda_on_the_blade_feels_the_forces_of_its_scene():
 
 
 def test_a_ball_in_a_torus_and_the_torus_push_each_other():
-    shell = torus()
     other = """<body name="torus"><freejoint/>
       <inertial pos="0.01 0.02 0.03" mass="2" fullinertia="0.1 0.12 0.2 0 0.01 0"/></body>"""
     model, data = model_of(ball(0.095, 0.3, more=other))
-    friction = sp.CoulombFriction(0.4, 0.3)
+    given = {"law": sp.HuntCrossleyLaw(1e4, 1.5), "friction": sp.CoulombFriction(0.4, 0.3)}
     touched = 0
-    with attach(
-        model, shell, ["ball"], body="torus", law=sp.HuntCrossleyLaw(1e4, 1.5), friction=friction
-    ):
+    with attach(model, torus(), ["ball"], body="torus", **given):
         for _ in range(100):
-            at = data.qpos
-            at[7:10], at[10:] = (
-                RNG.standard_normal(3),
-                pin.Quaternion(pin.exp3(RNG.standard_normal(3))).coeffs()[[3, 0, 1, 2]],
-            )
-            turn = pin.Quaternion(at[[11, 12, 13, 10]]).matrix()
+            at, turn = data.qpos, pin.exp3(RNG.standard_normal(3))
+            at[7:10], at[10:] = RNG.standard_normal(3), pin.Quaternion(turn).coeffs()[[3, 0, 1, 2]]
             angle = RNG.uniform(0, 6.28)
             middle = 0.3 * np.array([np.cos(angle), np.sin(angle), 0.0])
             at[:3] = at[7:10] + turn @ (middle + RNG.uniform(-6e-3, 6e-3, 3))
             data.qvel[:] = RNG.standard_normal(12)
             mujoco.mj_forward(model, data)
-            force, opposite = data.qfrc_passive[:3], data.qfrc_passive[6:9]
-            touched += bool(np.any(force))
-            scale = 1 + np.abs(data.qfrc_passive).max()
-            assert force + opposite == pytest.approx(np.zeros(3), abs=1e-12 * scale)
+            forces = data.qfrc_passive.reshape(2, 2, 3)
+            touched += bool(np.any(forces[0, 0]))
+            scale = 1 + np.abs(forces).max()
+            assert forces[:, 0].sum(axis=0) == pytest.approx(0.0, abs=1e-12 * scale)
             # The moments of both about the world's origin: a free joint's turns are the body's.
             moment = np.zeros(3)
-            for k, body in enumerate(("ball", "torus")):
-                own = data.body(body).xmat.reshape(3, 3) @ data.qfrc_passive[6 * k + 3 : 6 * k + 6]
-                moment += own + np.cross(
-                    at[7 * k : 7 * k + 3], data.qfrc_passive[6 * k : 6 * k + 3]
-                )
-            assert moment == pytest.approx(np.zeros(3), abs=1e-11 * scale)
+            for k, name in enumerate(("ball", "torus")):
+                moment += data.body(name).xmat.reshape(3, 3) @ forces[k, 1]
+                moment += np.cross(at[7 * k : 7 * k + 3], forces[k, 0])
+            assert moment == pytest.approx(0.0, abs=1e-11 * scale)
     assert touched > 20
 
 
@@ -111,12 +103,10 @@ def test_steps_are_those_of_a_simulation(friction):
 
 
 def test_energy_of_a_ball_that_swings_in_a_bowl():
-    xml = ball(0.05, 0.2, options='timestep="1e-4" integrator="RK4"')
-    model, data = model_of(xml)
+    model, data = model_of(ball(0.05, 0.2, options='timestep="1e-4" integrator="RK4"'))
     shell = sp.Shell(*meshes.bowl(24, 1.0, 2.0), name="bowl")
-    law = sp.HuntCrossleyLaw(1e6, 1.5)
     data.qpos[:3] = 0.2, 0.1, 0.08
-    with attach(model, shell, ["ball"], law=law) as contacts:
+    with attach(model, shell, ["ball"], law=sp.HuntCrossleyLaw(1e6, 1.5)) as contacts:
         # It is let fall from a hair above the bowl, and bounces.
         energies = []
         for _ in range(10000):
@@ -143,19 +133,11 @@ def test_models_and_threads_do_not_disturb_each_other():
             mujoco.mj_step(model, data)
         return data.qpos.copy()
 
-    jobs = [(model, speed) for model in made for speed in (0.1, 0.2, 0.3, 0.4)]
-    alone = [moved(*job) for job in jobs]
-    together: dict[int, np.ndarray] = {}
-    threads = [
-        threading.Thread(target=lambda k=k, job=job: together.update({k: moved(*job)}))
-        for k, job in enumerate(jobs)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(np.array_equal(together[k], one) for k, one in enumerate(alone))
-    assert len({one.tobytes() for one in alone}) == len(jobs)
+    models_of, speeds = zip(*itertools.product(made, (0.1, 0.2, 0.3, 0.4)), strict=True)
+    alone = list(map(moved, models_of, speeds))
+    with ThreadPoolExecutor(len(alone)) as pool:
+        assert np.array_equal(list(pool.map(moved, models_of, speeds)), alone)
+    assert len({one.tobytes() for one in alone}) == len(alone)
     for one in held:
         one.detach()
     assert moved(made[0], 0.1)[2] == pytest.approx(0.03 - 0.5 * 9.81 * 0.3**2, rel=1e-3)
@@ -173,19 +155,8 @@ def test_mujocos_own_contact_is_off_between_them_and_nowhere_else():
         mujoco.mj_forward(model, data)
         return {frozenset(model.geom(int(k)).name for k in pair) for pair in data.contact.geom}
 
-    data.qpos[2] = 0.009
-    data.qpos[9], data.qpos[16] = 0.0185, 0.0185
-    everything = {
-        frozenset(p)
-        for p in (
-            ("floor", "tray"),
-            ("floor", "a"),
-            ("floor", "b"),
-            ("tray", "a"),
-            ("tray", "b"),
-            ("a", "b"),
-        )
-    }
+    data.qpos[[2, 9, 16]] = 0.009, 0.0185, 0.0185
+    everything = set(map(frozenset, itertools.combinations(("floor", "tray", "a", "b"), 2)))
     assert touching() == everything
     with pytest.warns(SetupWarning):
         contacts = attach(model, plate(0.1), ["a"], body="tray", law=LAW)

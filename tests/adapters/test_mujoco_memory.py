@@ -27,17 +27,14 @@ from tests.adapters.mujoco_models import (  # noqa: E402
 )
 
 RNG = np.random.default_rng(0)
+SLOPE = f'gravity="{text(9.81 * np.sin(0.17), 0, -9.81 * np.cos(0.17))}" timestep="2e-5"'
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
 def test_a_ball_sticks_on_a_slope_and_a_reset_forgets(integrator):
     """Bristles hold the weight where the ball cannot roll: no creep, and none of before."""
-    slope = np.radians(10)
-    gravity = text(np.sin(slope) * 9.81, 0, -9.81 * np.cos(slope))
-    option = f'timestep="2e-5" integrator="{integrator}" gravity="{gravity}"'
-    model, data = model_of(sliding(option), {})
-    law, friction = STIFF, STICKS
-    with attach(model, plate(), ["ball"], law=law, friction=friction) as contacts:
+    model, data = model_of(sliding(f'{SLOPE} integrator="{integrator}"'), {})
+    with attach(model, plate(), ["ball"], law=STIFF, friction=STICKS) as contacts:
         ends = []
         for _ in range(2):
             mujoco.mj_resetData(model, data)
@@ -48,14 +45,11 @@ def test_a_ball_sticks_on_a_slope_and_a_reset_forgets(integrator):
             mujoco.mj_forward(model, data)
             found = contacts.contacts(data)
             weight = 0.1 * 9.81
-            assert found.normal_force.sum() == pytest.approx(weight * np.cos(slope), rel=1e-3)
+            assert found.normal_force.sum() == pytest.approx(weight * np.cos(0.17), rel=1e-3)
             held = -found.friction_force_world.sum(axis=0)[0]
-            assert held == pytest.approx(weight * np.sin(slope), rel=5e-3)
+            assert held == pytest.approx(weight * np.sin(0.17), rel=5e-3)
             assert abs(data.qvel[0]) < 2e-6
         assert np.array_equal(*ends)
-
-
-SLOPE = f'gravity="{text(9.81 * np.sin(0.17), 0, -9.81 * np.cos(0.17))}" timestep="2e-5"'
 
 
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicitfast"])
@@ -140,17 +134,15 @@ def test_rk4_moves_bristles_with_order_four():
 
 
 def test_memory_has_its_room(monkeypatch):
-    plain, _ = model_of(ball(0.02, 0.1))
-    for spec in (plain, model_of(ball(0.02, 0.1), {})[0]):
-        first = None
-        if spec is not plain:
-            first = attach(spec, plate(), ["ball"], law=LAW, friction=STICKS)
-        said = r"reserve\(spec, spheres=1\); model = spec.compile\(\)"
+    said = r"reserve\(spec, spheres=1\); model = spec.compile\(\)"
+    given = {"law": LAW, "friction": STICKS}
+    plain, roomy = model_of(ball(0.02, 0.1))[0], model_of(ball(0.02, 0.1), {})[0]
+    first = attach(roomy, plate(), ["ball"], **given)
+    for model in (plain, roomy):
         with pytest.raises(InvalidParameter, match=said):
-            attach(spec, plate(2.0), ["ball"], law=LAW, friction=STICKS)
-        if first is not None:
-            first.detach()
-            attach(spec, plate(2.0), ["ball"], law=LAW, friction=STICKS).detach()
+            attach(model, plate(2.0), ["ball"], **given)
+    first.detach()
+    attach(roomy, plate(2.0), ["ball"], **given).detach()
     with pytest.raises(InvalidParameter, match=r"must be a mujoco\.MjSpec"):
         reserve(plain)
     with pytest.raises(InvalidParameter, match="contacts = 0"):

@@ -18,7 +18,6 @@ from tests.fuzz.inputs import KINDS, TURNS, make_input
 from tests.fuzz.tables import prepare
 
 PATIENCE = 600.0  # [s] by the clock: a busy machine computes little, a file that waits nothing
-_OF_ALL = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
 MEMORY = 1 << 30  # [B] on top of what the process has before its first file
 
 
@@ -38,10 +37,6 @@ class Report:
 
     counts: Counter[tuple[str, str]] = field(default_factory=Counter)
     failures: list[Failure] = field(default_factory=list)
-    slowest: tuple[float, int] = (0.0, 0)
-    """[s], and which input."""
-    peak: int = 0
-    """[B] of memory, of the largest process, which may be one that a reader started."""
 
 
 @dataclass(frozen=True)
@@ -112,10 +107,7 @@ def _follow(task, ours, worker, place, report, failed):
                     continue
                 if what == "end":
                     return None
-                kind, outcome, took, peak = value
-                report.counts[kind, outcome] += 1
-                report.slowest = max(report.slowest, took)
-                report.peak = max(report.peak, peak)
+                report.counts[value] += 1
         except EOFError:
             worker.join()
             code = worker.exitcode
@@ -165,14 +157,11 @@ def _work(task: Task, theirs: Any, place: Any, folder: str) -> None:
         path = home / f"input{one.suffix}"
         path.write_bytes(one.data)
         place.value = k
-        start = time.monotonic()
         try:
             outcome = read(path)
         except BaseException as fault:
             outcome = "broke"
             why = f"{type(fault).__name__}: {' '.join(str(fault).split())[:200]}"
             theirs.send(("failure", Failure(task.seed, k, why, traceback.format_exc())))
-        peak = 1024 * max(resource.getrusage(who).ru_maxrss for who in _OF_ALL)
-        took = time.monotonic() - start
-        theirs.send(("news", (TURNS[k % len(TURNS)], outcome, (took, k), peak)))
+        theirs.send(("news", (TURNS[k % len(TURNS)], outcome)))
     theirs.send(("end", None))

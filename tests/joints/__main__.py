@@ -32,7 +32,7 @@ def main() -> int:
     begin, number, asked = time.perf_counter(), 0, 0
     total: Counter[str] = Counter()
     for verdict in of_files(options) if options.files else of_families(options):
-        counts = Counter({name: len(rows) for name, rows in verdict.faults.items() if rows})
+        counts = Counter({name: len(rows) for name, rows in verdict.found().items()})
         found = ", ".join(f"{name} {count}" for name, count in counts.items())
         spheres = len(verdict.radii)
         print(f"{verdict.part:60s} {spheres:6d}  {found}", flush=True)
@@ -56,9 +56,8 @@ def of_families(options: argparse.Namespace) -> Iterator[Verdict]:
     with tempfile.TemporaryDirectory() as folder:
         for number, family in enumerate(itertools.cycle(options.only or NAMES)):
             rng = np.random.default_rng([options.seed, number])
-            given = family, Path(folder), rng, options.stl, options.moved, options.count
             try:
-                yield walk_part(*given)
+                yield walk_part(family, Path(folder), rng, options.stl, options.count)
             except OccFailed as failure:
                 print(f"{family}: {failure}")
 
@@ -67,19 +66,14 @@ def arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.joints", description=(__doc__ or "").partition("\n")[0]
     )
-    parser.add_argument(
-        "--count", type=int, default=100_000, help="spheres, of each file or of all"
-    )
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", nargs="+", default=[], help=f"of {', '.join(NAMES)}")
-    parser.add_argument("--files", nargs="+", type=Path, default=[], help="STEP files")
-    parser.add_argument("--stl", action="store_true", help="binary STL files instead of STEP")
-    parser.add_argument("--moved", action="store_true", help="parts turned at random")
-    parser.add_argument("--show", type=int, default=0, help="spheres to print for each fault")
-    options = parser.parse_args()
-    if not {*options.only} <= {*NAMES}:
-        parser.error(f"--only takes {', '.join(NAMES)}")
-    return options
+    add = parser.add_argument
+    add("--count", type=int, default=100_000, help="spheres, of each file or of all")
+    add("--seed", type=int, default=1)
+    add("--only", nargs="+", default=[], choices=NAMES, metavar="FAMILY")
+    add("--files", nargs="+", type=Path, default=[], help="STEP files")
+    add("--stl", action="store_true", help="binary STL files instead of STEP")
+    add("--show", type=int, default=0, help="spheres to print for each fault")
+    return parser.parse_args()
 
 
 if __name__ == "__main__":

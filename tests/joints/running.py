@@ -8,7 +8,7 @@ from tests.joints.solid_walk import judge_solid, read_step, spheres_of
 from tests.joints.solids import FAMILIES, write_step, write_stl
 from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import Verdict, exact_share
-from tests.parts.occ import Rng, checked, placed
+from tests.parts.occ import Rng, checked
 
 PER_PART = 4000
 
@@ -22,10 +22,10 @@ DIGITS = {False: 2e-12, True: 2e-7}
 """What the digits of STEP files leave open, and the single precision of STL, over the size."""
 
 
-def walk_part(family, folder, rng, stl=False, moved=False, most=PER_PART):
-    """Walk over a random part of a family, in a random place if `moved`."""
+def walk_part(family, folder, rng, stl=False, most=PER_PART):
+    """Walk over a random part of a family."""
     solid = checked(BOXES[family](rng)) if family in BOXES else FAMILIES[family](rng).solid()
-    path = write_step(placed(solid, rng, 50.0) if moved else solid, folder / "part.step")
+    path = write_step(solid, folder / "part.step")
     return walk_file(path, family, min(PER_PART, most), rng, stl)
 
 

@@ -26,6 +26,8 @@ from sphshell_pin.base.arrays import Array
 from tests.parts import occ
 from tests.parts.occ import Rng, Solid, checked, rough_size
 
+Family = Callable[[Rng], "Part"]
+
 
 @dataclass(frozen=True)
 class Piece:
@@ -153,10 +155,8 @@ def pocket(radius: float, floor: float, rim: float) -> Part:
     deep, wide = 3 * floor + 2 * rim + 5, radius + 3 * rim + 5
     top = deep + 8.0
     corners = [[0, 0], [wide, 0], [wide, top], [radius, top], [radius, 8.0], [0, 8.0]]
-    return Part(
-        f"pocket {radius:g} floor {floor:g} rim {rim:g}",
-        outline(corners, {3: rim, 4: floor, 2: rim}),
-    )
+    name = f"pocket {radius:g} floor {floor:g} rim {rim:g}"
+    return Part(name, outline(corners, {3: rim, 4: floor, 2: rim}))
 
 
 def shaft(radius: float, fillet: float, miss: float = 0.0) -> Part:
@@ -173,10 +173,8 @@ def ring(radius: float, fillet: float) -> Part:
     """A tube whose four rims are rounded."""
     inner, high = radius - 3 * fillet - 1, 3 * fillet + 4
     corners = [[inner, 0], [radius, 0], [radius, high], [inner, high]]
-    return Part(
-        f"ring {radius:g} fillet {fillet:g}",
-        outline(corners, dict.fromkeys(range(4), fillet), closed=True),
-    )
+    pieces = outline(corners, dict.fromkeys(range(4), fillet), closed=True)
+    return Part(f"ring {radius:g} fillet {fillet:g}", pieces)
 
 
 def cones(radius: float, lean: float, fillet: float = 0.0) -> Part:
@@ -188,7 +186,7 @@ def cones(radius: float, lean: float, fillet: float = 0.0) -> Part:
     return Part(f"cones {radius:g} lean {lean:g} fillet {fillet:g}", outline(corners, radii))
 
 
-def dome(radius: float, length: float) -> Part:
+def dome(radius: float, length: float = 120.0) -> Part:
     """A rod with a ball end that is tangent, and a flatter dome at the other."""
     tip, flat = np.array([0.0, length]), 1.7 * radius
     deep = flat - np.sqrt(flat**2 - radius**2)
@@ -207,25 +205,17 @@ def slot(length: float, radius: float, depth: float = 20.0) -> Part:
     """A stadium, extruded: two lines and two arcs that are tangent."""
     corners = [[0, 0], [length, 0], [length, 2 * radius], [0, 2 * radius]]
     # Arcs of half a turn are two quarters.
-    return Part(
-        f"slot {length:g} radius {radius:g}",
-        outline(corners, dict.fromkeys(range(4), radius), closed=True),
-        depth,
-    )
+    pieces = outline(corners, dict.fromkeys(range(4), radius), closed=True)
+    return Part(f"slot {length:g} radius {radius:g}", pieces, depth)
 
 
-def bar(side: float, radii: tuple[float, float], miss: float) -> Part:
+def bar(side: float, a: float, b: float, miss: float = 0.0) -> Part:
     """A bar, its edges rounded, which may miss the tangents; one corner is hollow."""
-    a, b = radii
-    corners = [[0, 0], [2 * side, 0], [2 * side, side], [side, side], [side, 2 * side]]
-    corners += [[0, 2 * side]]
+    corners = side * np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
     rounds = {0: a, 1: b, 3: a, 4: b}
     missed = dict.fromkeys(rounds, (miss, -0.6 * miss))
-    return Part(
-        f"bar {side:g} radii {a:g} {b:g} off {miss:g}",
-        outline(corners, rounds, missed, {2: min(a, side / 4)}, closed=True),
-        80.0,
-    )
+    pieces = outline(corners, rounds, missed, {2: min(a, side / 4)}, closed=True)
+    return Part(f"bar {side:g} radii {a:g} {b:g} off {miss:g}", pieces, 80.0)
 
 
 def d_shaft(radius: float, cut: float) -> Part:
@@ -242,35 +232,34 @@ def d_shaft(radius: float, cut: float) -> Part:
     return Part(f"d-shaft {radius:g} cut {cut:g}", pieces, 60.0)
 
 
-FAMILIES: dict[str, Callable[[Rng], Part]] = {
-    "disc": lambda rng: disc(rough_size(rng, 12, 200), rough_size(rng, 0.05, 5.5)),
-    "disc off": lambda rng: disc(rough_size(rng, 12, 200), rough_size(rng, 0.05, 5.5), _miss(rng)),
-    "pocket": lambda rng: pocket(
-        rough_size(rng, 25, 200), rough_size(rng, 0.05, 10), rough_size(rng, 0.05, 10)
-    ),
-    "shaft": lambda rng: shaft(rough_size(rng, 5, 100), rough_size(rng, 0.05, 10)),
-    "shaft off": lambda rng: shaft(rough_size(rng, 5, 100), rough_size(rng, 0.05, 10), _miss(rng)),
-    "ring": lambda rng: ring(rough_size(rng, 35, 200), rough_size(rng, 0.05, 10)),
-    "cones": lambda rng: cones(rough_size(rng, 20, 100), rng.uniform(0.02, 0.6)),
-    "cones filleted": lambda rng: cones(
-        rough_size(rng, 20, 100), rng.uniform(0.1, 0.6), rough_size(rng, 0.1, 10)
-    ),
-    "dome": lambda rng: dome(rough_size(rng, 5, 50), 120.0),
-    "slot": lambda rng: slot(rough_size(rng, 25, 100), rough_size(rng, 1, 10)),
-    "bar": lambda rng: bar(
-        rough_size(rng, 25, 80), (rough_size(rng, 0.05, 5), rough_size(rng, 0.05, 10)), 0.0
-    ),
-    "bar off": lambda rng: bar(
-        rough_size(rng, 25, 80), (rough_size(rng, 0.05, 5), rough_size(rng, 0.05, 10)), _miss(rng)
-    ),
-    "d-shaft": lambda rng: d_shaft(rough_size(rng, 3, 40), rough_size(rng, 0.005, 1.0)),
-}
-"""Random parts of a family."""
-
-
 def _miss(rng: Rng) -> float:
     """An angle by which a joint is off tangent [rad]."""
     return float(10 ** rng.uniform(-5, -2) * rng.choice([-1.0, 1.0]))
+
+
+def _sized(make: Callable[..., Part], *ranges: tuple[float, float], off: bool = False) -> Family:
+    """Return what makes a part of random sizes, whose joints may be off tangent."""
+    return lambda rng: make(*(rough_size(rng, *r) for r in ranges), *([_miss(rng)] * off))
+
+
+ROUND = (0.05, 10)
+
+FAMILIES: dict[str, Family] = {
+    "disc": _sized(disc, (12, 200), (0.05, 5.5)),
+    "disc off": _sized(disc, (12, 200), (0.05, 5.5), off=True),
+    "pocket": _sized(pocket, (25, 200), ROUND, ROUND),
+    "shaft": _sized(shaft, (5, 100), ROUND),
+    "shaft off": _sized(shaft, (5, 100), ROUND, off=True),
+    "ring": _sized(ring, (35, 200), ROUND),
+    "cones": _sized(cones, (20, 100), (0.02, 0.6)),
+    "cones filleted": _sized(cones, (20, 100), (0.1, 0.6), (0.1, 10)),
+    "dome": _sized(dome, (5, 50)),
+    "slot": _sized(slot, (25, 100), (1, 10)),
+    "bar": _sized(bar, (25, 80), (0.05, 5), ROUND),
+    "bar off": _sized(bar, (25, 80), (0.05, 5), ROUND, off=True),
+    "d-shaft": _sized(d_shaft, (3, 40), (0.005, 1.0)),
+}
+"""Random parts of a family."""
 
 
 def tube_on_equator(inner: float, tube: float, other: float) -> Solid:

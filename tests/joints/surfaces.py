@@ -149,14 +149,7 @@ class Crossing:
     def closest(self, centers: Array) -> tuple[Ints, Array, Array, Array]:
         """Rows of centers, local minima of the distance, tangents there, and whether inside."""
         chords = np.diff(self.points, axis=0)
-        far = np.linalg.norm(centers[:, None] - self.points, axis=2)
-        if self.closed:
-            far = far[:, :-1]
-            before, after = np.roll(far, 1, 1), np.roll(far, -1, 1)
-        else:
-            before = np.pad(far[:, :-1], ((0, 0), (1, 0)), constant_values=np.inf)
-            after = np.pad(far[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
-        rows, near = np.nonzero((far <= before) & (far < after))
+        rows, near = near_minima(centers, self.points, self.closed)
         last = len(chords)
         at = near.astype(float)
         low, high = at - REACH, at + REACH
@@ -194,6 +187,19 @@ class Crossing:
         x = self.points[k] + s * s * (3 - 2 * s) * chords[k]
         x = x + s * (1 - s) * length[:, None] * ((1 - s) * one - s * two)
         return _onto_both(self.one, self.two, x), (1 - s) * one + s * two, length
+
+
+def near_minima(centers: Array, points: Array, closed: bool) -> tuple[Ints, Ints]:
+    """Rows of centers (n, 3), and those of points along a curve that are nearer than beside."""
+    far = np.linalg.norm(centers[:, None] - points, axis=2)
+    if closed:
+        far = far[:, :-1]
+        before, after = np.roll(far, 1, 1), np.roll(far, -1, 1)
+    else:
+        before = np.pad(far[:, :-1], ((0, 0), (1, 0)), constant_values=np.inf)
+        after = np.pad(far[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
+    rows, near = np.nonzero((far <= before) & (far < after))
+    return rows, near
 
 
 def _dot(a: Array, b: Array) -> Array:

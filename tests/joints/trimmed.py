@@ -19,7 +19,7 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS
 
 from sphshell_pin.base.arrays import Array
-from tests.joints.surfaces import Crossing, Surface
+from tests.joints.surfaces import Crossing, Surface, near_minima
 from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Solid, faces
 
@@ -74,14 +74,7 @@ class Edge:
             at = low + np.mod(np.arctan2(away @ y, away @ x) - low, 2 * np.pi)
         else:
             grid, points = self.grid
-            far = np.linalg.norm(centers[:, None] - points, axis=2)
-            if self.closed:
-                before, after = np.roll(far[:, :-1], 1, 1), np.roll(far[:, :-1], -1, 1)
-            else:
-                before = np.pad(far[:, :-1], ((0, 0), (1, 0)), constant_values=np.inf)
-                after = np.pad(far[:, 1:], ((0, 0), (0, 1)), constant_values=np.inf)
-            here = far[:, : before.shape[1]]
-            rows, near = np.nonzero((here <= before) & (here < after))
+            rows, near = near_minima(centers, points, self.closed)
             pairs = zip(rows.tolist(), grid[near].tolist(), strict=True)
             at = np.array([self._newton(centers[row], t) for row, t in pairs])
         # Round a closed edge there is no end.

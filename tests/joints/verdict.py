@@ -1,5 +1,6 @@
 """What is wrong with the contacts of spheres."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,46 +11,36 @@ from sphshell_pin.base.arrays import Array
 
 MM = 1e-3
 
-FAULTS = {
-    "lost": "no contact where the sphere touches",
-    "missing": "a minimum of the distance has no contact",
-    "shallow": "the deepest contact is too shallow",
-    "deep": "the deepest contact is too deep",
-    "phantom": "a contact is at no minimum of the distance",
-    "double": "the weights add up to more than the components of the surface inside the sphere",
-    "force": "one minimum, on a plane, and another force",
-}
-
 
 @dataclass
 class Verdict:
-    """Spheres that were asked, and the rows of those with faults.
+    """Spheres that were asked, and what is wrong with some.
 
     Attributes
     ----------
     centers, radii : (n, 3) and (n,) [m]; joints : what meets there, one a sphere
-    faults : rows by the name of the fault; details : of rows
+    faults : descriptions of spheres by the name of the fault:
+        lost, no contact where the sphere touches
+        missing, a minimum of the distance has no contact
+        shallow, deep, the deepest contact is too shallow, or too deep
+        phantom, a contact is at no minimum of the distance
+        double, the weights add up to more than the components of the surface inside the sphere
+        force, one minimum, on a plane, and another force
     """
 
     part: str
     centers: Array
     radii: Array
     joints: list[str]
-    faults: dict[str, list[int]] = field(default_factory=lambda: {name: [] for name in FAULTS})
-    details: dict[int, str] = field(default_factory=dict)
+    faults: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
     def add(self, fault: str, row: int, detail: str) -> None:
-        self.faults[fault].append(row)
-        self.details[row] = detail
+        where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
+        self.faults[fault].append(f"{self.joints[row]}: {where}: {detail}")
 
     def found(self) -> dict[str, list[str]]:
         """Faults, with a description of each sphere."""
-        found = self.faults.items()
-        return {name: [self.describe(row) for row in rows] for name, rows in found if rows}
-
-    def describe(self, row: int) -> str:
-        where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
-        return f"{self.joints[row]}: {where}: {self.details[row]}"
+        return dict(self.faults)
 
 
 def exact_share(shell: sp.Shell) -> float:

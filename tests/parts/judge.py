@@ -11,7 +11,7 @@ from sphshell_pin import ImpactLaw, Shell
 from sphshell_pin.base.arrays import Array
 from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
-from tests.parts.solids import family_of, random_solid
+from tests.parts.solids import random_solid
 from tests.parts.truth import Places, Touches, places_beside, touches_of
 
 METHODS = ("smooth", "facets")
@@ -47,8 +47,6 @@ class Part:
     """A random part: its mesh, a finer one, and what is exactly known of the solid [mm]."""
 
     number: int
-    family: str
-    deflection: float
     mesh: CadMesh
     fine: CadMesh
     places: Places
@@ -61,7 +59,7 @@ class Verdict:
 
     Attributes
     ----------
-    number, family, file, triangles, deflection, touches : of the part and its file
+    file, triangles, touches : of the part and its file
     largest, mean : errors of distances
     off_plane : touches of planes whose curved force is off by more than the flat one's
     forces : smallest and largest on planes
@@ -70,11 +68,8 @@ class Verdict:
     recognized : share of the triangles in faces that were found
     """
 
-    number: int
-    family: str
     file: str
     triangles: int
-    deflection: float
     largest: dict[str, float]
     mean: dict[str, float]
     touches: int
@@ -111,8 +106,6 @@ def random_part(number: int, seed: int = 1) -> Part:
     faces, deflection = coarse_enough(solid, share * size, angle)
     return Part(
         number=number,
-        family=family_of(number),
-        deflection=deflection / size,
         mesh=joined(faces),
         fine=fine,
         places=places_beside(solid, size, PLACES, rng),
@@ -128,11 +121,8 @@ def judged(part: Part, kind: str) -> Verdict:
     forces = {method: forces_on_planes(shell, part.touches, method) for method in METHODS}
     off = {method: np.abs(forces[method] - 1.0) for method in METHODS}
     return Verdict(
-        number=part.number,
-        family=part.family,
         file=kind,
         triangles=len(rows),
-        deflection=part.deflection,
         largest={method: float(error.max()) for method, error in errors.items()},
         mean={method: float(error.mean()) for method, error in errors.items()},
         touches=len(part.touches.depths),

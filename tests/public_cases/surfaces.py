@@ -1,15 +1,13 @@
 """Reports about surfaces: distances, depths, holes, units, files of other programs."""
 
-import tempfile
-from pathlib import Path
-
 import numpy as np
 
 import sphshell_pin as sp
 from sphshell_pin import robots
+from tests import urdf
 from tests.meshes import cube
 from tests.public_cases import case
-from tests.public_cases.shapes import binary_stl, terrain
+from tests.public_cases.shapes import INERTIAL, binary_stl, elements_read, folder, terrain
 
 HEIGHT = 0.2
 
@@ -37,21 +35,15 @@ def above_a_terrain() -> float:
 
 def bored_plate(suffix: str) -> sp.Shell:
     """Return a plate of 20 mm with a bore of 10 mm, from a CAD file or its STL."""
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.StlAPI import StlAPI_Writer
-
+    from tests.joints.solids import write_step, write_stl
     from tests.parts import occ
-    from tests.shell.cad_shapes import write_step
 
     plate = occ.box((-20, -20, -10), (20, 20, 10))
     plate = occ.cut(plate, occ.cylinder(5.0, 30.0, (0, 0, -15)))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"plate.{suffix}"
+    with folder() as home:
         if suffix == "step":
-            return sp.Shell.from_file(write_step(path, ("plate", plate)))
-        BRepMesh_IncrementalMesh(plate, 0.1, False, 0.5)
-        StlAPI_Writer().Write(plate, str(path))
-        return sp.Shell.from_file(path, unit="mm")
+            return sp.Shell.from_file(write_step(plate, home / "plate.step"))
+        return sp.Shell.from_file(write_stl(plate, home / "plate.stl", 0.1, 0.5), unit="mm")
 
 
 def deepest_in_bore(suffix: str, gap: float) -> float:
@@ -77,20 +69,15 @@ def too_wide_for_a_round_hole() -> float:
 
 @case
 def mirrored_mesh() -> float:
-    link = (
-        '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" '
-        'ixz="0" iyz="0"/></inertial>{}</link>'
-    )
-    mesh = '<collision><geometry><mesh filename="part.stl" scale="1 -1 1"/></geometry></collision>'
-    joint = (
-        '<joint name="j" type="prismatic"><parent link="base"/><child link="part"/><axis '
-        'xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "part.stl").write_bytes(binary_stl(b"part"))
-        robot = Path(folder) / "mirrored.urdf"
-        links = link.format("base", "") + link.format("part", mesh)
-        robot.write_text(f'<robot name="mirrored">{links}{joint}</robot>', encoding="utf-8")
+    mesh = '<mesh filename="part.stl" scale="1 -1 1"/>'
+    with folder() as home:
+        (home / "part.stl").write_bytes(binary_stl(b"part"))
+        robot = urdf.write(
+            home / "mirrored.urdf",
+            urdf.link("base", INERTIAL),
+            urdf.link("part", INERTIAL, urdf.shape("collision", mesh)),
+            urdf.joint("j", "prismatic", "base", "part"),
+        )
         geometry = robots.load_file(robot).collision_model.geometryObjects[0]
         shell = sp.Shell.from_geometry(geometry, side="outside")
     return float(shell.contacts([0.02, -0.04, -0.009], 0.01).depth.max())
@@ -101,16 +88,13 @@ def units_of_a_step_file() -> float:
     from tests.shell.cad_shapes import box, write_step
 
     cube, sides = ("cube", box(25.4, 25.4, 25.4)), []
-    with tempfile.TemporaryDirectory() as folder:
+    with folder() as home:
         for unit in ("INCH", "M", "FT", "UM", "MM"):
-            path = write_step(Path(folder) / f"{unit}.step", cube, unit=unit)
+            path = write_step(home / f"{unit}.step", cube, unit=unit)
             sides += list(np.ptp(sp.Shell.from_file(path).vertices, axis=0))
     return float(max(sides, key=lambda side: abs(side - 0.0254)))
 
 
 @case
 def binary_stl_called_solid() -> float:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "part.stl"
-        path.write_bytes(binary_stl(b"solid exported by a CAD program"))
-        return sp.Shell.from_file(path, unit="m").num_elements
+    return elements_read(b"solid exported by a CAD program")

@@ -19,6 +19,16 @@ CUBE, _QUADS = meshes.cube(quads=True)
 CUBE = CUBE + 0.5
 CUBE_QUADS = _QUADS.tolist()
 
+TRIANGLE = {
+    "obj": "v 2 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n",
+    "off": "OFF\n3 1 0\n2 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+    "shl": "3 1 1.0\n2 0 0\n1 0 0\n0 1 0\n3 1 2 3\n",
+    "ply": "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+    "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    "2 0 0\n1 0 0\n0 1 0\n3 0 1 2\n",
+}
+"""As files have it, by suffix."""
+
 
 def surface_file(name: str) -> Path:
     """Return the path of other people's surface `name`, or skip the test that needs it."""
@@ -38,6 +48,12 @@ def tetrahedron(scale=1.0, at=(0.0, 0.0, 0.0)):
     """Return a tetrahedron wound outward: vertices, triangles."""
     points = scale * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]) + np.array(at)
     return points, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def star(corners, rng):
+    """Return a random star-shaped polygon (n, 2), counter-clockwise."""
+    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.3, 0.3, corners)) / corners
+    return rng.uniform(0.3, 1.0, corners)[:, None] * np.c_[np.cos(angle), np.sin(angle)]
 
 
 def joined(*parts):
@@ -67,6 +83,13 @@ def by_place(surface: CleanedSurface, wound=True):
         else:
             out.append(tuple(sorted(places)))
     return sorted(out)
+
+
+def expect(health, *said, **figures):
+    """Check figures of a report on a surface's health, and parts of sentences that it has."""
+    assert {name: getattr(health, name) for name in figures} == pytest.approx(figures)
+    sentences = " ".join((*health.repairs, *health.problems, *health.notes))
+    assert [part for part in said if part not in sentences] == []
 
 
 def signed_volume(surface):

@@ -14,6 +14,7 @@ from sphshell_pin import Shell, errors
 from tests.parts.occ import area_and_volume
 from tests.programs import python
 from tests.shell import cad_shapes as shapes
+from tests.shell.surfaces import expect
 
 
 def load(tmp_path, shape, **options):
@@ -25,15 +26,14 @@ def load(tmp_path, shape, **options):
 )
 def test_solids_come_closed_with_their_area_and_volume(make, tmp_path):
     shape = getattr(shapes, make)()
-    shell = load(tmp_path, shape, chord_error=4e-5)
+    health = load(tmp_path, shape, chord_error=4e-5).health
     area, volume = area_and_volume(shape)
-    assert shell.is_closed
-    assert shell.health.problems == ()
-    assert shell.health.area == pytest.approx(area * 1e-6, rel=5e-3)
+    assert health.is_closed
+    assert health.problems == ()
+    assert health.area == pytest.approx(area * 1e-6, rel=5e-3)
     # The solid is off by less than a layer as thick as the chord error.
-    assert abs(shell.health.volume - volume * 1e-9) < 4e-5 * shell.health.area
-    assert any("chord error 4e-05 m stated" in note for note in shell.health.notes)
-    assert any(note.endswith(": held") for note in shell.health.notes)
+    assert abs(health.volume - volume * 1e-9) < 4e-5 * health.area
+    expect(health, "chord error 4e-05 m stated", ": held")
 
 
 def unit(vectors):
@@ -69,8 +69,8 @@ def test_normals_are_those_of_the_exact_surface(make, tmp_path):
     assert np.abs(shell.normals[chosen] - exact[chosen]).max() < 1e-6
 
 
-def test_faces_are_known_by_element(tmp_path):
-    shell = load(tmp_path, shapes.box())
+def test_faces_are_known_by_element(box):
+    shell = Shell.from_file(box, "mm")
     assert shell.face_names == tuple(f"Face {k}" for k in range(1, 7))
     # One plane each: elements of a face share a normal, faces do not.
     normals = shell.triangle_normals[np.searchsorted(shell.triangle_element, np.arange(12))]
@@ -90,84 +90,116 @@ def test_tangent_faces_are_one_patch_and_sharp_ones_are_not(crease_angle, tmp_pa
 
 def test_a_kink_inside_a_face_divides_it(tmp_path):
     shell = load(tmp_path, shapes.roof())
-    assert shell.face_names == ("Face 1", "Face 1")
-    assert shell.num_patches == 2
+    assert (shell.face_names, shell.num_patches) == (("Face 1", "Face 1"), 2)
     ridge = np.isclose(shell.vertices[:, 0], 0.010)
     assert ridge.sum() >= 2
     assert np.allclose(shell.vertices[ridge, 2], 0.003)
 
 
-def test_bodies_and_faces_can_be_chosen_by_name(tmp_path):
-    path = shapes.write_step(
-        tmp_path / "two.step",
-        ("plate", shapes.box()),
-        ("pin", shapes.cylinder()),
-        faces=[(0, "barrel")],
-    )
-    both = Shell.from_file(path)
-    assert both.health.components == 2
-    pin = Shell.from_file(path, bodies=["pin"])
+@pytest.fixture
+def two(tmp_path):
+    bodies = ("plate", shapes.box()), ("pin", shapes.cylinder())
+    return shapes.write_step(tmp_path / "two.step", *bodies, faces=[(0, "barrel")])
+
+
+def test_bodies_and_faces_can_be_chosen_by_name(two):
+    assert Shell.from_file(two).health.components == 2
+    pin = Shell.from_file(two, bodies=["pin"])
     assert np.allclose(pin.box, [[0.095, -0.005, 0], [0.105, 0.005, 0.02]], atol=1e-4)
     assert pin.is_closed
-    barrel = Shell.from_file(path, faces=["barrel"])
-    assert not barrel.is_closed
-    assert barrel.health.area == pytest.approx(2 * np.pi * 0.005 * 0.02, rel=1e-2)
-    assert Shell.from_file(path, faces=[7]).health.area == barrel.health.area
+    barrel = Shell.from_file(two, faces=["barrel"])
+    area = pytest.approx(2 * np.pi * 0.005 * 0.02, rel=1e-2)
+    assert (barrel.is_closed, barrel.health.area) == (False, area)
+    assert Shell.from_file(two, faces=[7]).health.area == barrel.health.area
     assert set(barrel.face_names) == {"barrel"}
-    with pytest.raises(errors.NameNotFound, match=r"no body 'bolt'; two\.step has: plate, pin"):
-        Shell.from_file(path, bodies=["bolt"])
-    with pytest.raises(errors.NameNotFound, match="barrel, Face 8, Face 9"):
-        Shell.from_file(path, bodies=["pin"], faces=["Face 1"])
+
+
+@pytest.mark.parametrize(
+    ("options", "kind", "told"),
+    [
+        ({"bodies": ["bolt"]}, errors.NameNotFound, r"no body 'bolt'; two\.step has: plate, pin"),
+        (
+            {"bodies": ["pin"], "faces": ["Face 1"]},
+            errors.NameNotFound,
+            "barrel, Face 8, Face 9",
+        ),
+        ({"chord_error": 0.0}, errors.InvalidParameter, "chord_error"),
+        ({"sew": -1.0}, errors.InvalidParameter, "sew"),
+        ({"bodies": "pin"}, errors.InvalidParameter, "bodies"),
+        ({"faces": []}, errors.InvalidParameter, "faces"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(options, kind, told, two):
+    with pytest.raises(kind, match=told):
+        Shell.from_file(two, **options)
 
 
 def test_faces_written_one_by_one_are_joined(tmp_path):
     path = shapes.write_iges(tmp_path / "loose.iges", shapes.rounded_box())
-    shell = Shell.from_file(path)
-    assert shell.is_closed
-    assert any("joined within" in note for note in shell.health.notes)
-    loose = Shell.from_file(path, sew=0)
-    assert not any("joined within" in note for note in loose.health.notes)
+    expect(Shell.from_file(path).health, "joined within", is_closed=True)
+    assert "joined within" not in " ".join(Shell.from_file(path, sew=0).health.notes)
 
 
-def test_brep_files_need_a_unit(tmp_path):
-    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
-    with pytest.raises(errors.UnitMissing, match=r"box.brep measures 37.42 units"):
-        Shell.from_file(path)
+WRITERS = {
+    ".step": lambda path, shape: shapes.write_step(path, ("one", shape)),
+    ".iges": shapes.write_iges,
+    ".brep": shapes.write_brep,
+}
 
 
-def test_a_wire_holds_no_surface(tmp_path):
+@pytest.mark.parametrize("suffix", WRITERS)
+def test_a_wire_holds_no_surface(suffix, tmp_path):
     edge = BRepBuilderAPI_MakeEdge(gp_Pnt(0, 0, 0), gp_Pnt(1, 0, 0)).Edge()
-    files = [
-        shapes.write_brep(tmp_path / "wire.brep", edge),
-        shapes.write_iges(tmp_path / "wire.iges", edge),
-        shapes.write_step(tmp_path / "wire.step", ("wire", edge)),
-    ]
-    for path in files:
-        with pytest.raises(errors.ShellFileError, match="holds no surface"):
-            Shell.from_file(path, "mm")
+    with pytest.raises(errors.ShellFileError, match="holds no surface"):
+        Shell.from_file(WRITERS[suffix](tmp_path / f"wire{suffix}", edge), "mm")
 
 
-@pytest.mark.parametrize("suffix", [".step", ".iges", ".brep"])
+@pytest.mark.parametrize("suffix", WRITERS)
 def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
-    write = {
-        ".step": lambda path: shapes.write_step(path, ("box", shapes.box())),
-        ".iges": lambda path: shapes.write_iges(path, shapes.box()),
-        ".brep": lambda path: shapes.write_brep(path, shapes.box()),
-    }[suffix]
-    whole = write(tmp_path / f"whole{suffix}").read_bytes()
+    path = tmp_path / f"part{suffix}"
+    whole = WRITERS[suffix](path, shapes.box()).read_bytes()
     capfd.readouterr()
-    broken = {
-        "empty": (b"", "is empty"),
-        "text": (b"this is no CAD file\n", "does not begin as one"),
-        "half": (whole[: len(whole) // 2], "is truncated"),
-        "noise": (bytes(range(256)) * 20, "does not begin as one"),
-    }
-    for name, (data, told) in broken.items():
-        path = tmp_path / f"{name}{suffix}"
+    for data, told in (
+        (b"", "is empty"),
+        (b"this is no CAD file\n", "does not begin as one"),
+        (whole[: len(whole) // 2], "is truncated"),
+        (bytes(range(256)) * 20, "does not begin as one"),
+    ):
         path.write_bytes(data)
         with pytest.raises(errors.ShellFileError, match=told):
             Shell.from_file(path, "mm")
     assert capfd.readouterr() == ("", "")
+
+
+ABSENT = "libGL.so.1: cannot open shared object file: No such file or directory"
+
+
+@pytest.mark.parametrize(
+    ("library", "kind", "told"),
+    [
+        ("", errors.MissingExtra, r"reading .brep files needs .*sphshell-pin\[cad\]"),
+        (
+            f"raise ImportError({ABSENT!r})",
+            errors.UnusableExtra,
+            r"installed but cannot be loaded: .*it needs the library libGL\.so\.1, which is "
+            r"absent; .* install libgl1 libx11-6$",
+        ),
+        (
+            "raise ImportError('GLIBC_2.99 not found')",
+            errors.UnusableExtra,
+            r"installed but cannot be loaded: .*\(GLIBC_2\.99 not found\)",
+        ),
+    ],
+)
+def test_a_library_that_is_absent_is_named(library, kind, told, box, monkeypatch):
+    """Processes started from now on find a package of this text in place of OpenCASCADE."""
+    package = box.parent / "first" / "OCP"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text(library)
+    monkeypatch.setattr(sys, "path", [str(package.parent), *sys.path])
+    with pytest.raises(kind, match=told) as caught:
+        Shell.from_file(box, "mm")
+    assert getattr(caught.value, "reason", "") in library
 
 
 @pytest.mark.parametrize(("make", "chord_error"), [("ball", 1e-12), ("rounded_box", 1e-9)])
@@ -178,79 +210,30 @@ def test_what_would_take_millions_of_triangles_is_refused(make, chord_error, tmp
         load(tmp_path, getattr(shapes, make)(), chord_error=chord_error)
 
 
-@pytest.mark.parametrize(
-    "options", [{"chord_error": 0.0}, {"sew": -1.0}, {"bodies": "pin"}, {"faces": []}]
-)
-def test_options_out_of_range_are_refused(options, tmp_path):
-    with pytest.raises(errors.InvalidParameter, match=next(iter(options))):
-        load(tmp_path, shapes.box(), **options)
-
-
-def test_options_of_cad_are_refused_for_meshes(tmp_path):
-    path = tmp_path / "part.stl"
-    load(tmp_path, shapes.box()).to_file(path)
-    with pytest.raises(errors.InvalidParameter, match="belongs to CAD files"):
-        Shell.from_file(path, "m", chord_error=1e-4)
-
-
-def put_before_the_library(folder, monkeypatch, text):
-    """Let processes started from now on find a package of this text in place of OpenCASCADE."""
-    (folder / "first" / "OCP").mkdir(parents=True)
-    (folder / "first" / "OCP" / "__init__.py").write_text(text)
-    monkeypatch.setattr(sys, "path", [str(folder / "first"), *sys.path])
-
-
-def test_without_the_library_the_extra_is_named(tmp_path, monkeypatch):
-    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
-    put_before_the_library(tmp_path, monkeypatch, "")
-    with pytest.raises(
-        errors.MissingExtra, match=r"reading .brep files needs .*sphshell-pin\[cad\]"
-    ):
-        Shell.from_file(path, "mm")
-
-
-@pytest.mark.parametrize(
-    ("reason", "told"),
-    [
-        (
-            "libGL.so.1: cannot open shared object file: No such file or directory",
-            r"it needs the library libGL\.so\.1, which is absent; .* install libgl1 libx11-6$",
-        ),
-        ("version 'GLIBC_2.99' not found", r"\(version 'GLIBC_2\.99' not found\)"),
-    ],
-)
-def test_a_library_of_the_system_that_is_absent_is_named(reason, told, tmp_path, monkeypatch):
-    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
-    put_before_the_library(tmp_path, monkeypatch, f"raise ImportError({reason!r})")
-    with pytest.raises(
-        errors.UnusableExtra, match="installed but cannot be loaded: .*" + told
-    ) as caught:
-        Shell.from_file(path, "mm")
-    assert caught.value.reason == reason
-
-
-def test_the_library_is_never_imported(tmp_path):
+def test_the_library_is_never_imported(box):
     """So does reading a CAD file: another process imports it."""
-    path = shapes.write_brep(tmp_path / "box.brep", shapes.box())
     code = f"""
 import sys, sphshell_pin
-print(len(sphshell_pin.Shell.from_file({str(path)!r}, "mm").face_names))
+print(len(sphshell_pin.Shell.from_file({str(box)!r}, "mm").face_names))
 print(any(m.split(".")[0] == "OCP" for m in sys.modules))
 """
     done = python(code, check=True)
-    assert done.stdout.split() == ["6", "False"]
-    assert done.stderr == ""
+    assert (done.stdout.split(), done.stderr) == (["6", "False"], "")
 
 
-def test_a_scenario_takes_a_body_of_a_cad_file_without_a_unit(tmp_path):
+def test_a_scenario_takes_a_body_of_a_cad_file_without_a_unit(two):
     from sphshell_pin.scenario import build
     from tests.scenario.files import DROP, write
 
-    shapes.write_step(tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder()))
     file = 'file = "two.step"\nchord_error = 1e-5\nbodies = ["pin"]'
     text = DROP.replace('primitive = { type = "box", size = [0.2, 0.2, 0.02] }', file)
-    (pair,) = build(write(tmp_path, text)).scene.pairs
+    (pair,) = build(write(two.parent, text)).scene.pairs
     assert pair.side_j.shell.box[0, 0] == pytest.approx(0.095, abs=1e-5)
     assert pair.side_j.shell.is_closed
     with pytest.raises(Exception, match="no body 'nut'"):
-        build(write(tmp_path, text.replace('"pin"', '"nut"')))
+        build(write(two.parent, text.replace('"pin"', '"nut"')))
+
+
+@pytest.fixture
+def box(tmp_path):
+    return shapes.write_brep(tmp_path / "box.brep", shapes.box())

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -114,43 +113,35 @@ process.CHILD = "own_child"
 Shell.from_file({str(box)!r}, "mm")
 """
     parent = subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.PIPE)
-    (pid,) = wait_for(lambda: children(parent.pid) or None)
+    pid = wait_for(lambda: listed("pid=", "--ppid", parent.pid))
     time.sleep(1.5)  # until it does its job
     os.kill(parent.pid, number)
     assert parent.wait(30) == -number
     assert (b"KeyboardInterrupt" in parent.communicate()[1]) == (number == signal.SIGINT)
-    wait_for(lambda: not running(pid) or None)
+    wait_for(lambda: listed("stat=", "-p", pid)[:1] in ("Z", ""))
 
 
-def children(pid):
-    bare = {"PATH": os.environ["PATH"]}
-    command = ["ps", "-o", "pid=", "--ppid", str(pid)]
-    return subprocess.run(command, capture_output=True, check=False, env=bare).stdout.split()
-
-
-def running(pid):
+def listed(*of):
+    """Return what ps lists of processes."""
     # Without libraries that sanitizers load first: ps may not end with them.
     bare = {"PATH": os.environ["PATH"]}
-    command = ["ps", "-o", "stat=", "-p", pid]
-    shown = subprocess.run(command, capture_output=True, check=False, env=bare)
-    return shown.stdout[:1] not in (b"Z", b"")
+    command = ["ps", "-o", *map(str, of)]
+    return subprocess.run(
+        command, capture_output=True, text=True, check=False, env=bare
+    ).stdout.strip()
 
 
 def wait_for(answer):
     deadline = time.monotonic() + 60.0
     while time.monotonic() < deadline:
-        try:
-            found = answer()
-        except (OSError, ValueError, IndexError):
-            found = None
-        if found is not None:
+        if found := answer():
             return found
         time.sleep(0.05)
     raise AssertionError("in vain")
 
 
 def test_a_child_is_used_again_and_by_one_at_a_time(box):
-    def load():
+    def load(_=None):
         return Shell.from_file(box, "mm").vertices
 
     whole = load()
@@ -160,15 +151,8 @@ def test_a_child_is_used_again_and_by_one_at_a_time(box):
     with pytest.raises(InvalidParameter, match="unit"):
         Shell.from_file(box)  # the fault of the caller, not of the file
     assert process._idle == [first]
-    found = []
-    threads = [threading.Thread(target=lambda: found.append(load())) for _ in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert all(np.array_equal(one, whole) for one in found)
-    assert len(found) == 2
-    assert len(process._idle) == 1
+    with ThreadPoolExecutor(2) as pool:
+        assert all(np.array_equal(one, whole) for one in pool.map(load, range(2)))
     # A process forked of this one must not talk to its child.
     (idle,) = process._idle
     worker = multiprocessing.get_context("fork").Process(target=load)
@@ -189,14 +173,13 @@ def test_limits_are_checked_and_told_on_the_command_line(box, tmp_path):
     for name in ("time_limit", "memory_limit"):
         with pytest.raises(InvalidParameter, match=f"{name} = 0 must be positive"):
             Shell.from_file(box, "mm", **{name: 0})
-    target = ["convert", str(box), str(tmp_path / "box.stl"), "--unit-in", "mm"]
     process._end_idle()  # one that has worked has memory to spare
-    told = call(*target, "--memory-limit", "1")
-    assert told.exit_code == 2
-    assert "memory limit of 1e-09 GB" in told.stderr
-    told = call("check", box, "--unit", "mm", "--time-limit", "1e-3")
-    assert told.exit_code == 2
-    assert "time limit of 0.001 s" in told.stderr
+    to = ["convert", box, tmp_path / "box.stl", "--unit-in", "mm", "--memory-limit", "1"]
+    check = ["check", box, "--unit", "mm", "--time-limit", "1e-3"]
+    for line, said in ((to, "memory limit of 1e-09 GB"), (check, "time limit of 0.001 s")):
+        told = call(*line)
+        assert told.exit_code == 2
+        assert said in told.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["box.brep"]
 
 

@@ -9,7 +9,6 @@ pytest.importorskip("OCP")
 
 from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
-from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
 
 SIDES = np.array([20.0, 30.0, 10.0])
@@ -56,102 +55,91 @@ def converted(name, millimeters):
     )
 
 
-def written(folder, text, suffix=".step"):
-    path = folder / f"part{suffix}"
-    path.write_text(text)
-    return path
+@pytest.fixture
+def written(tmp_path):
+    def written(text, suffix=".step"):
+        path = tmp_path / f"part{suffix}"
+        path.write_text(text)
+        return path
+
+    return written
 
 
-def sides(shell):
-    """Lengths of the first box [m]."""
-    own = shell.vertices[shell.vertices[:, 0] < 0.5 * shell.box[:, 0].sum()]
-    return np.ptp(own, axis=0)
-
-
-UNITS = {
-    "m": (prefixed("$"), 1.0, "m"),
-    "mm": (prefixed(".MILLI."), 1e-3, "mm"),
-    "um": (prefixed(".MICRO."), 1e-6, "um"),
-    "nm": (prefixed(".NANO."), 1e-9, "1e-09 m"),
-    "inch": (converted("INCH", "25.4"), 0.0254, "in"),
-    "foot, in lower case": (converted("foot", "3.048E2"), 0.3048, "ft"),
-    "millimeter of its own": (converted("MILLIMETER", "1."), 1e-3, "mm"),
-    "furlong": (converted("FURLONG", "201168."), 201.168, "201.168 m"),
-    "inch that is none": (converted("INCH", "30."), 0.03, "0.03 m"),
-}
-
-
-@pytest.mark.parametrize("name", UNITS)
-def test_step_units_are_taken_by_their_length_not_by_their_name(name, step, tmp_path):
-    entities, meters, called = UNITS[name]
-    path = written(tmp_path, with_unit(step, entities))
-    shell = Shell.from_file(path)
-    assert np.allclose(sides(shell), SIDES * meters, rtol=1e-12, atol=0.0)
+def check_sides(shell, meters):
+    """Lengths of the box in a file of one, or of the first one."""
+    own = shell.vertices[shell.vertices[:, 0] < 40 * meters]
+    assert np.allclose(np.ptp(own, axis=0), SIDES * meters, rtol=1e-12, atol=0.0)
     assert shell.health.scale == pytest.approx(meters, rel=1e-12)
+
+
+def check_unit(path, meters, called):
+    """The unit of the header holds, unless another one is stated, with a warning."""
+    shell = Shell.from_file(path)
+    check_sides(shell, meters)
     assert shell.unit == called
     with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
-        other = Shell.from_file(path, "yd")
-    assert np.allclose(sides(other), SIDES * 0.9144, rtol=1e-12, atol=0.0)
-    assert other.health.scale == 0.9144
+        check_sides(Shell.from_file(path, "yd"), 0.9144)
 
 
-def test_a_step_file_without_a_unit_needs_one(step, tmp_path):
+UNITS = [
+    (prefixed("$"), 1.0, "m"),
+    (prefixed(".NANO."), 1e-9, "1e-09 m"),
+    (converted("INCH", "25.4"), 0.0254, "in"),
+    (converted("foot", "3.048E2"), 0.3048, "ft"),
+    (converted("MILLIMETER", "1."), 1e-3, "mm"),
+    (converted("FURLONG", "201168."), 201.168, "201.168 m"),
+    (converted("INCH", "30."), 0.03, "0.03 m"),  # an inch that is none
+]
+
+
+@pytest.mark.parametrize(("entities", "meters", "called"), UNITS)
+def test_step_units_are_taken_by_their_length_not_by_their_name(
+    entities, meters, called, step, written
+):
+    check_unit(written(with_unit(step, entities)), meters, called)
+
+
+def test_a_step_file_without_a_unit_needs_one(step, written):
     """Of the contexts' lists of units the first, that of length, is taken away; or all lists."""
     for text in (
         re.sub(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\(#\d+,", "GLOBAL_UNIT_ASSIGNED_CONTEXT((", step),
         re.sub(r"GLOBAL_UNIT_ASSIGNED_CONTEXT\s*\(\([^)]*\)\)", "", step),
     ):
         assert text != step
-        path = written(tmp_path, text)
+        path = written(text)
         told = r"unit = None must be stated, as the header of part\.step states none: one of m, "
         with pytest.raises(UnitMissing, match=told + r".*measures 1[\d.]+ units: say unit='mm'"):
             Shell.from_file(path)
         for unit, meters in (("mm", 1e-3), ("m", 1.0), ("in", 0.0254)):
-            shell = Shell.from_file(path, unit)
-            assert np.allclose(sides(shell), SIDES * meters, rtol=1e-12, atol=0.0)
-            assert shell.health.scale == meters
+            check_sides(Shell.from_file(path, unit), meters)
 
 
-def test_several_units_hold_for_their_own_parts(step, tmp_path):
-    path = written(tmp_path, with_unit(step, converted("INCH", "25.4"), part=1))
-    both = Shell.from_file(path)
+def test_several_units_hold_for_their_own_parts(step, written):
+    path = written(with_unit(step, converted("INCH", "25.4"), part=1))
     for body, meters in (("box", 1e-3), ("pin", 0.0254)):
         own = Shell.from_file(path, bodies=[body])
         assert np.allclose(np.ptp(own.vertices, axis=0), SIDES * meters, rtol=1e-12, atol=0.0)
-    assert any("units 'mm', 'in' from the file's header" in note for note in both.health.notes)
+    notes = Shell.from_file(path).health.notes
+    assert any("units 'mm', 'in' from the file's header" in note for note in notes)
     with pytest.raises(InvalidParameter, match=r"the 2 units 'mm', 'in' that part\.step states"):
         Shell.from_file(path, "mm")
 
 
-def test_units_without_a_name_are_converted_to_one(step, tmp_path):
-    path = written(tmp_path, with_unit(step, converted("FURLONG", "201168.")))
-    done = convert(path, tmp_path / "out.ply")
-    assert done.target.unit == "mm"
-    assert done.target.size == pytest.approx(done.source.size, rel=1e-12)
-
-
-def with_header(iges, edit, delimiter=",", ends=";"):
-    """The text of an IGES file with other global parameters, and other delimiters throughout."""
+def with_header(iges, unit, delimiter=",", ends=";"):
+    """The text of an IGES file with another unit in its header, and other delimiters throughout."""
     lines = iges.splitlines()
     table = "".join(line[:72] for line in lines if line[72] == "G")
     assert table.startswith(",,")
-    table = edit(table[2:])
+    table = table[2:].replace(",2,2HMM,", f",{unit},")
     swap = str.maketrans({",": delimiter, ";": ends})
     first = "," if (delimiter, ends) == (",", ";") else f"1H{delimiter}{delimiter}1H{ends}"
     table = f"{first}{delimiter}{table.translate(swap)}"
     rows = [table[k : k + 72] for k in range(0, len(table), 72)]
     found = {kind: [line for line in lines if line[72] == kind] for kind in "SDPT"}
-    last = found["T"][0]
-    return "\n".join(
-        [
-            *found["S"],
-            *(f"{row:72s}G{number:7d}" for number, row in enumerate(rows, 1)),
-            *found["D"],
-            *(line[:64].translate(swap) + line[64:] for line in found["P"]),
-            f"{last[:8]}G{len(rows):7d}{last[16:]}",
-            "",
-        ]
-    )
+    header = [f"{row:72s}G{number:7d}" for number, row in enumerate(rows, 1)]
+    data = [line[:64].translate(swap) + line[64:] for line in found["P"]]
+    last = f"{found['T'][0][:8]}G{len(rows):7d}{found['T'][0][16:]}"
+    return "\n".join([*found["S"], *header, *found["D"], *data, last, ""])
 
 
 @pytest.mark.parametrize(
@@ -168,32 +156,21 @@ def with_header(iges, edit, delimiter=",", ends=";"):
         ("11,3HUIN", 2.54e-8, "2.54e-08 m"),
     ],
 )
-def test_iges_units_come_by_flag_or_by_name(stated, meters, called, iges, tmp_path):
-    text = with_header(iges, lambda table: table.replace(",2,2HMM,", f",{stated},"))
-    path = written(tmp_path, text, ".iges")
-    shell = Shell.from_file(path)
-    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * meters, rtol=1e-12, atol=0.0)
-    assert shell.unit == called
-    with pytest.warns(UnitWarning, match=re.escape(f"header says '{called}'")):
-        other = Shell.from_file(path, "yd")
-    assert np.allclose(np.ptp(other.vertices, axis=0), SIDES * 0.9144, rtol=1e-12, atol=0.0)
+def test_iges_units_come_by_flag_or_by_name(stated, meters, called, iges, written):
+    check_unit(written(with_header(iges, stated), ".iges"), meters, called)
 
 
-def test_iges_units_nobody_knows(iges, tmp_path):
-    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",3,7HFURLONG,"))
-    path = written(tmp_path, text, ".iges")
+def test_iges_units_nobody_knows(iges, written):
+    path = written(with_header(iges, "3,7HFURLONG"), ".iges")
     with pytest.raises(UnitMissing, match=r"the header of part\.iges states none"):
         Shell.from_file(path)
-    shell = Shell.from_file(path, "in")
-    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * 0.0254, rtol=1e-12, atol=0.0)
-    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",99,2HMM,"))
+    check_sides(Shell.from_file(path, "in"), 0.0254)
     with pytest.raises(ShellFileError, match="by flag 99, which IGES does not have"):
-        Shell.from_file(written(tmp_path, text, ".iges"), "mm")
+        Shell.from_file(written(with_header(iges, "99,2HMM"), ".iges"), "mm")
 
 
 @pytest.mark.parametrize(("delimiter", "ends"), ["/;", "|!", ":#"])
-def test_iges_delimiters_are_those_of_the_header(delimiter, ends, iges, tmp_path):
-    text = with_header(iges, lambda table: table.replace(",2,2HMM,", ",1,2HIN,"), delimiter, ends)
-    shell = Shell.from_file(written(tmp_path, text, ".iges"))
-    assert np.allclose(np.ptp(shell.vertices, axis=0), SIDES * 0.0254, rtol=1e-12, atol=0.0)
+def test_iges_delimiters_are_those_of_the_header(delimiter, ends, iges, written):
+    shell = Shell.from_file(written(with_header(iges, "1,2HIN", delimiter, ends), ".iges"))
+    check_sides(shell, 0.0254)
     assert shell.is_closed

@@ -11,6 +11,7 @@ from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError
 from sphshell_pin.shell import converting
 from sphshell_pin.shell.converting import convert
 from tests.command import call, succeed
+from tests.meshes import cube
 from tests.shell import cad_shapes as shapes
 
 
@@ -51,12 +52,13 @@ def test_exact_normals_reach_the_file_corner_by_corner(plate, suffix, tmp_path):
 
 @pytest.mark.parametrize("suffix", [".stl", ".off"])
 def test_what_a_format_does_not_hold_is_stated(plate, suffix, tmp_path):
-    done = convert(plate, tmp_path / f"out{suffix}")
+    target = tmp_path / f"out{suffix}"
+    done = convert(plate, target)
     assert f"{suffix} files hold no normals" in done.notes[-1]
     assert "recognized again" in done.notes[-1]
-    (face,) = [one for one in Shell.from_file(tmp_path / f"out{suffix}", "mm").faces if one.radius]
+    (face,) = [one for one in Shell.from_file(target, "mm").faces if one.radius]
     assert face.radius == pytest.approx(0.010, rel=1e-6)
-    again = convert(tmp_path / f"out{suffix}", tmp_path / "copy.off", "mm")
+    again = convert(target, tmp_path / "copy.off", "mm")
     assert not any("normals" in note for note in again.notes)
 
 
@@ -69,15 +71,12 @@ def test_quads_stay_quads_between_meshes(tmp_path):
 
 
 def test_a_body_is_converted_alone(tmp_path):
-    path = shapes.write_step(
-        tmp_path / "two.step", ("plate", shapes.box()), ("pin", shapes.cylinder())
-    )
-    convert(path, tmp_path / "pin.stl", bodies=["pin"])
-    pin = Shell.from_file(tmp_path / "pin.stl", "mm")
+    bodies = ("plate", shapes.box()), ("pin", shapes.cylinder())
+    path = shapes.write_step(tmp_path / "two.step", *bodies)
+    pin = convert(path, tmp_path / "pin.stl", bodies=["pin"]).target
     assert pin.is_closed
     assert np.allclose(pin.box[0, 0], 0.095, atol=1e-4)
-    side = convert(path, tmp_path / "side.stl", faces=[7]).target
-    assert not side.is_closed
+    assert not convert(path, tmp_path / "side.stl", faces=[7]).target.is_closed
 
 
 def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_path, monkeypatch):
@@ -97,21 +96,23 @@ def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_pat
     assert sorted(tmp_path.iterdir()) == before
 
 
-def test_what_cannot_be_is_refused(plate, tmp_path):
-    for target, message in (("out.xyz", "must end in one of"), ("out.step", "must end in one of")):
-        with pytest.raises(InvalidParameter, match=message):
-            convert(plate, tmp_path / target)
-    with pytest.raises(ShellFileError, match="No such file"):
-        convert(plate, tmp_path / "nowhere" / "out.stl")
-    with pytest.raises(InvalidParameter, match="unit"):
-        convert(plate, tmp_path / "out.obj", unit_out="parsec")
-    convert(plate, tmp_path / "out.stl")
-    with pytest.raises(InvalidParameter, match="another file"):
-        convert(tmp_path / "out.stl", tmp_path / "out.stl", "mm")
-    with pytest.raises(InvalidParameter, match="belongs to CAD files"):
-        convert(tmp_path / "out.stl", tmp_path / "out.obj", "mm", chord_error=1e-4)
-    with pytest.raises(InvalidParameter, match="time_limit = 9 belongs to CAD files"):
-        convert(tmp_path / "out.stl", tmp_path / "out.obj", "mm", time_limit=9)
+@pytest.mark.parametrize(
+    ("source", "target", "options", "kind", "told"),
+    [
+        ("plate.step", "out.xyz", {}, InvalidParameter, "must end in one of"),
+        ("plate.step", "out.step", {}, InvalidParameter, "must end in one of"),
+        ("plate.step", "nowhere/out.stl", {}, ShellFileError, "No such file"),
+        ("plate.step", "out.obj", {"unit_out": "parsec"}, InvalidParameter, "unit"),
+        ("box.stl", "box.stl", {}, InvalidParameter, "another file"),
+        ("box.stl", "a.obj", {"chord_error": 1e-4}, InvalidParameter, "belongs to CAD files"),
+        ("box.stl", "a.obj", {"time_limit": 9}, InvalidParameter, "time_limit = 9 belongs to CAD"),
+    ],
+)
+def test_what_cannot_be_is_refused(source, target, options, kind, told, plate, tmp_path):
+    Shell(*cube()).to_file(tmp_path / "box.stl")
+    unit = "mm" if source == "box.stl" else None
+    with pytest.raises(kind, match=told):
+        convert(tmp_path / source, tmp_path / target, unit, **options)
 
 
 def test_the_command_prints_what_it_measured(plate, tmp_path):
@@ -119,7 +120,6 @@ def test_the_command_prints_what_it_measured(plate, tmp_path):
     told = succeed("convert", plate, target, "--chord-error", "1e-4")
     assert "distance of a vertex of either" in told.output
     assert "chord error 0.0001 m stated" in told.output
-    assert target.is_file()
     told = succeed("check", plate, "--face", "7", "--chord-error", "1e-5")
     assert "1 CAD face, tolerance" in told.output
     told = call("convert", target, tmp_path / "out.obj")

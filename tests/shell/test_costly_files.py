@@ -13,6 +13,8 @@ from sphshell_pin.errors import InvalidShell, ShellFileError
 from sphshell_pin.shell import clean
 
 from ..oracle.ear_clipping import clip_ears
+from .surfaces import TRIANGLE
+from .surfaces import star as star_of
 
 
 def on_circle(radius, angle):
@@ -20,9 +22,7 @@ def on_circle(radius, angle):
 
 
 def star(count):
-    rng = np.random.default_rng(count)
-    angle = 2 * np.pi * (np.arange(count) + rng.uniform(-0.3, 0.3, count)) / count
-    return on_circle(rng.uniform(0.3, 1.0, count), angle)
+    return star_of(count, np.random.default_rng(count))
 
 
 def gear(count):
@@ -148,33 +148,32 @@ def test_many_solids_cost_little_more_than_one(tmp_path, ends):
     assert cost(many) < 10 * cost(one)
 
 
-PLY = "ply\nformat {}\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n"
-FACES = "element face {}\nproperty list uchar int vertex_indices\nend_header\n"
-POINTS = "0 0 0\n1 0 0\n0 1 0\n"
 MANY = 4_000_000_000
+BINARY = TRIANGLE["ply"].partition("end_header")[0].replace("ascii", "binary_little_endian")
 
-CLAIMS = {
+CLAIMS = {  # in the texts of a triangle: what is replaced by what
+    "vertices.ply": ("vertex 3", f"vertex {MANY}"),
+    "faces.ply": ("face 1", f"face {MANY}"),
+    "corners.ply": ("3 0 1", f"{MANY} 0 1"),
+    "vertices.off": ("3 1 0", f"{MANY} 1 0"),
+    "faces.off": ("3 1 0", f"3 {MANY} 0"),
+    "corners.off": ("3 0 1", f"{MANY} 0 1"),
+    "points.shl": ("3 1 1.0", "2000000000 1 1.0"),
+    "polygons.shl": ("3 1 1.0", "3 2000000000 1.0"),
+    "corners.shl": ("3 1 2", f"{MANY} 1 2"),
+    "normals.shl": ("3 1 1.0", "Version: 2\n3 1 2000000000 1.0"),
     "binary.stl": b"\0" * 80 + struct.pack("<I", MANY) + b"\0" * 50,
-    "vertices.ply": (PLY.format("ascii 1.0", MANY) + FACES.format(1) + POINTS).encode(),
-    "faces.ply": (PLY.format("ascii 1.0", 3) + FACES.format(MANY) + POINTS).encode(),
-    "corners.ply": (PLY.format("ascii 1.0", 3) + FACES.format(1) + POINTS + f"{MANY} 0").encode(),
-    "binary.ply": (
-        (PLY.format("binary_little_endian 1.0", 3) + FACES.format(MANY)).encode() + b"\0" * 99
-    ),
-    "vertices.off": f"OFF\n{MANY} 1 0\n{POINTS}".encode(),
-    "faces.off": f"OFF\n3 {MANY} 0\n{POINTS}3 0 1 2\n".encode(),
-    "corners.off": f"OFF\n3 1 0\n{POINTS}{MANY} 0 1 2\n".encode(),
-    "points.shl": f"2000000000 1 1.0\n{POINTS}3 1 2 3\n".encode(),
-    "polygons.shl": f"3 2000000000 1.0\n{POINTS}3 1 2 3\n".encode(),
-    "corners.shl": f"3 1 1.0\n{POINTS}{MANY} 1 2 3\n".encode(),
-    "normals.shl": f"Version: 2\n3 1 2000000000 1.0\n{POINTS}3 1 2 3\n".encode(),
+    "binary.ply": BINARY.replace("face 1", f"face {MANY}").encode() + b"end_header\n" + b"\0" * 99,
 }
 
 
 @pytest.mark.parametrize("name", CLAIMS)
 def test_a_size_that_is_only_claimed_takes_no_memory(tmp_path, name):
     path = tmp_path / name
-    path.write_bytes(CLAIMS[name])
+    claim = CLAIMS[name]
+    if isinstance(claim, tuple):
+        claim = TRIANGLE[path.suffix[1:]].replace(*claim).encode()
+    path.write_bytes(claim)
     unit = None if path.suffix == ".shl" else "m"
     tracemalloc.start()
     try:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import clean
 
-from .surfaces import areas, by_place
+from .surfaces import areas, by_place, expect, star
 
 
 def total(surface):
@@ -22,13 +22,11 @@ def ring(points):
 def test_warped_quads_are_split_and_reported(lift, split):
     points = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, lift], [0, 1, 0]])
     surface = clean(points, [[0, 1, 2, 3]])
-    health = surface.health
-    assert health.quads == (0 if split else 1)
-    assert health.warped_quads == int(split)
+    expect(surface.health, quads=1 - split, warped_quads=int(split))
     assert (surface.source_element == 0).all()
     if split:
-        assert health.largest_warp == pytest.approx(lift / 4, rel=0.05)
-        assert "not planar" in " ".join(health.repairs)
+        assert surface.health.largest_warp == pytest.approx(lift / 4, rel=0.05)
+        expect(surface.health, "not planar")
 
 
 def test_concave_quads_are_split_through_the_reflex_corner():
@@ -55,11 +53,9 @@ def test_the_diagonal_does_not_depend_on_numbering(numbers, turned, width, slant
 def test_a_hole_reached_by_a_bridge_stays_a_hole():
     outer = [[0.0, 0], [3, 0], [3, 3], [0, 3]]
     inner = [[1.0, 1], [1, 2], [2, 2], [2, 1]]
-    points = ring(np.array(outer + inner))
-    surface = clean(points, [[0, 1, 2, 3, 0, 4, 5, 6, 7, 4]])
+    surface = clean(ring(np.array(outer + inner)), [[0, 1, 2, 3, 0, 4, 5, 6, 7, 4]])
     assert total(surface) == pytest.approx(8.0)
-    assert surface.health.boundary_loops == 2
-    assert surface.health.tangled_polygons == 0
+    expect(surface.health, boundary_loops=2, tangled_polygons=0)
     assert (areas(surface)[:, 2] > 0).all()
 
 
@@ -67,24 +63,18 @@ def test_a_hole_reached_by_a_bridge_stays_a_hole():
 @settings(max_examples=40, deadline=None)
 def test_star_polygons_are_covered_exactly(corners, seed, turn):
     rng = np.random.default_rng(seed)
-    angle = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.3, 0.3, corners)) / corners
-    radius = rng.uniform(0.3, 1.0, corners)
-    flat = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    flat = star(corners, rng)
     area = 0.5 * np.sum(flat[:, 0] * np.roll(flat[:, 1], -1) - flat[:, 1] * np.roll(flat[:, 0], -1))
     basis, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     points = flat @ basis[:2]
     one = clean(points, [list(range(corners))])
-    assert one.health.elements == corners - 2
-    assert one.health.vertices == corners
+    figures = {"elements": corners - 2, "vertices": corners, "boundary_edges": corners}
+    expect(one.health, tangled_polygons=0, **figures)
     assert total(one) == pytest.approx(area, rel=1e-12)
-    assert one.health.tangled_polygons == 0
-    assert one.health.boundary_edges == corners
     two = clean(points, [np.roll(np.arange(corners), turn).tolist()])
     assert by_place(one, wound=False) == by_place(two, wound=False)
 
 
 def test_outlines_that_cross_themselves_are_reported():
     points = ring(np.array([[0.0, 0], [2, 0], [0, 1], [2, 1], [1, 2.0]]))
-    surface = clean(points, [[0, 1, 2, 3, 4]])
-    assert surface.health.tangled_polygons == 1
-    assert any("crosses itself" in sentence for sentence in surface.health.problems)
+    expect(clean(points, [[0, 1, 2, 3, 4]]).health, "crosses itself", tangled_polygons=1)

@@ -9,6 +9,8 @@ from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
 from tests import urdf
 
+from .surfaces import expect, tetrahedron
+
 ROUND = {
     "sphere": coal.Sphere(0.3),
     "cylinder": coal.Cylinder(0.2, 0.7),
@@ -17,14 +19,6 @@ ROUND = {
     "cone": coal.Cone(0.2, 0.5),
     "ellipsoid": coal.Ellipsoid(0.1, 0.2, 0.35),
 }
-
-
-def samples(shell, n=40):
-    """Return points spread over the triangles (t * n, 3), with their interpolated normals."""
-    weights = np.random.default_rng(0).dirichlet([1, 1, 1], n)
-    points = np.einsum("nk,tkx->tnx", weights, shell.vertices[shell.triangles])
-    normals = np.einsum("nk,tkx->tnx", weights, shell.normals)
-    return points.reshape(-1, 3), normals.reshape(-1, 3)
 
 
 def depth_inside(name, p):
@@ -57,19 +51,16 @@ def test_round_solids(name, share, segments):
     option = {"segments": segments} if segments else {}
     if share is not None:
         option["chord_error"] = share * diameter
-    share = share or 1e-3
     shell = Shell.from_geometry(shape, **option)
-    health = shell.health
-    assert health.ok
-    assert not health.repairs
-    assert health.is_closed
-    assert health.euler_number == 2
-    assert health.opposing_normals == 0
+    expect(shell.health, ok=True, is_closed=True, euler_number=2, opposing_normals=0)
+    assert not shell.health.repairs
     assert np.linalg.norm(shell.normals, axis=2) == pytest.approx(1.0, abs=1e-15)
-    inside = depth_inside(name, samples(shell)[0])
+    weights = np.random.default_rng(0).dirichlet([1, 1, 1], 40)
+    points = np.einsum("nk,tkx->tnx", weights, shell.vertices[shell.triangles])
+    inside = depth_inside(name, points.reshape(-1, 3))
     assert inside.min() > -1e-12 * diameter
-    if "segments" not in option:
-        assert inside.max() <= share * diameter * 1.001
+    if not segments:
+        assert inside.max() <= (share or 1e-3) * diameter * 1.001
     at = depth_inside(name, shell.vertices)
     assert np.abs(at).max() < 1e-12 * max(shell.size, diameter)
 
@@ -88,11 +79,10 @@ def test_corner_normals_of_smooth_solids(name):
 def test_corner_normals_of_solids_with_a_rim(name, slope):
     shell = Shell.from_geometry(ROUND[name], segments=24)
     points, normals = shell.vertices[shell.triangles], shell.normals
-    flat = np.abs(shell.triangle_normals[:, 2]) > 0.999
-    assert normals[flat] == pytest.approx(
-        np.repeat(np.sign(shell.triangle_normals[flat, None, 2:]) * [0, 0, 1.0], 3, axis=1)
-    )
+    up = shell.triangle_normals[:, 2]
+    flat = np.abs(up) > 0.999
     assert flat.sum() == (44 if name == "cylinder" else 22)
+    assert normals[flat, :, 2] == pytest.approx(np.repeat(np.sign(up[flat, None]), 3, axis=1))
     points, normals = points[~flat].reshape(-1, 3), normals[~flat].reshape(-1, 3)
     length = np.hypot(1.0, slope)
     assert normals[:, 2] == pytest.approx(slope / length)
@@ -102,8 +92,7 @@ def test_corner_normals_of_solids_with_a_rim(name, slope):
 
 def test_box():
     shell = Shell.from_geometry(coal.Box(1.0, 2.0, 3.0), name="crate")
-    assert (shell.health.quads, shell.num_elements) == (6, 6)
-    assert shell.health.volume == pytest.approx(6.0)
+    expect(shell.health, quads=6, elements=6, volume=6.0)
     assert shell.box == pytest.approx(np.array([[-0.5, -1, -1.5], [0.5, 1, 1.5]]))
     assert shell.name == "crate"
     assert shell.health.largest_normal_angle == pytest.approx(0.0, abs=1e-7)
@@ -113,11 +102,9 @@ def test_box():
 def test_half_space_is_a_square_sheet(kind):
     normal = np.array([1.0, 2.0, 2.0]) / 3.0
     shell = Shell.from_geometry(kind(normal, 0.4), extent=3.0)
-    assert shell.num_elements == 1
+    expect(shell.health, "stands for the endless", elements=1, area=9.0)
     assert shell.vertices @ normal == pytest.approx(0.4)
-    assert shell.health.area == pytest.approx(9.0)
     assert shell.normals == pytest.approx(np.broadcast_to(normal, (2, 3, 3)))
-    assert any("stands for the endless" in note for note in shell.health.notes)
 
 
 def test_triangle():
@@ -127,32 +114,32 @@ def test_triangle():
     assert shell.normals[0].tolist() == [[0, 0, 1]] * 3
 
 
-def mesh(shell, kind=coal.BVHModelOBBRSS):
-    model = kind()
-    model.beginModel(len(shell.triangles), len(shell.vertices))
-    model.addVertices(np.array(shell.vertices))
-    model.addTriangles(np.array(shell.triangles))
-    model.endModel()
-    return model
-
-
 @pytest.mark.parametrize("kind", [coal.BVHModelOBBRSS, coal.BVHModelOBB])
 def test_mesh_is_taken_as_it_is(kind):
     ball = Shell.from_geometry(coal.Sphere(0.5), segments=12)
-    back = Shell.from_geometry(mesh(ball, kind))
+    model = kind()
+    model.beginModel(len(ball.triangles), len(ball.vertices))
+    model.addVertices(np.array(ball.vertices))
+    model.addTriangles(np.array(ball.triangles))
+    model.endModel()
+    back = Shell.from_geometry(model)
     assert back.vertices == pytest.approx(ball.vertices)
     assert back.triangles.tolist() == ball.triangles.tolist()
 
 
 def test_convex():
     points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for point in ([0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]):
-        points.append(np.array(point, float))
-    for corners in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)):
-        triangles.append(coal.Triangle(*corners))
+    corners, elements = tetrahedron()
+    points.extend(list(corners))
+    triangles.extend([coal.Triangle(*one) for one in elements.tolist()])
     shell = Shell.from_geometry(coal.Convex(points, triangles))
-    assert shell.is_closed
-    assert shell.health.volume == pytest.approx(1 / 6)
+    expect(shell.health, is_closed=True, volume=1 / 6)
+
+
+def swollen():
+    box = coal.Box(1.0, 1.0, 1.0)
+    box.setSweptSphereRadius(0.1)
+    return box
 
 
 def test_geometry_object_gives_name_and_own_frame():
@@ -177,17 +164,18 @@ def test_mesh_scale_of_a_urdf_is_applied_once(tmp_path):
     assert shell.box == pytest.approx(np.array([[-1, -1.5, -2], [1, 1.5, 2]]))
 
 
-def test_faults():
-    with pytest.raises(InvalidParameter, match="Capsule, Cone, Ellipsoid"):
-        Shell.from_geometry("sphere")
-    with pytest.raises(InvalidParameter, match="Box"):
-        Shell.from_geometry(coal.HeightFieldAABB(1.0, 1.0, np.zeros((3, 3)), -1.0))
-    for options in ({"chord_error": 0.0}, {"chord_error": np.nan}, {"segments": 2}):
-        with pytest.raises(InvalidParameter):
-            Shell.from_geometry(coal.Sphere(1.0), **options)
-    with pytest.raises(InvalidParameter, match="extent"):
-        Shell.from_geometry(coal.Halfspace(np.array([0, 0, 1.0]), 0.0), extent=-1.0)
-    swollen = coal.Box(1.0, 1.0, 1.0)
-    swollen.setSweptSphereRadius(0.1)
-    with pytest.raises(InvalidParameter, match="swept-sphere"):
-        Shell.from_geometry(swollen)
+@pytest.mark.parametrize(
+    ("shape", "options", "said"),
+    [
+        ("sphere", {}, "Capsule, Cone, Ellipsoid"),
+        (coal.HeightFieldAABB(1.0, 1.0, np.zeros((3, 3)), -1.0), {}, "Box"),
+        (coal.Sphere(1.0), {"chord_error": 0.0}, "chord_error"),
+        (coal.Sphere(1.0), {"chord_error": np.nan}, "chord_error"),
+        (coal.Sphere(1.0), {"segments": 2}, "segments"),
+        (coal.Halfspace(np.array([0, 0, 1.0]), 0.0), {"extent": -1.0}, "extent"),
+        (swollen(), {}, "swept-sphere"),
+    ],
+)
+def test_faults(shape, options, said):
+    with pytest.raises(InvalidParameter, match=said):
+        Shell.from_geometry(shape, **options)

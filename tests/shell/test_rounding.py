@@ -42,8 +42,7 @@ def test_half_a_step(numbers, expected, scale):
 
 
 def test_coarse_grids_and_few_numbers_are_no_rounding():
-    rng = np.random.default_rng(1)
-    voxels = rng.integers(0, 200, (2000, 3)).astype(float)
+    voxels = np.random.default_rng(1).integers(0, 200, (2000, 3)).astype(float)
     for numbers in (CUBE, 0.1 * CUBE, 100 + CUBE, voxels, 0.3 * voxels):
         assert rounding(numbers) <= 1e-7 * np.abs(numbers).max()
     for nothing in (np.zeros((4, 3)), np.zeros((0, 3)), np.full((4, 3), np.nan), [[np.inf] * 3]):
@@ -53,14 +52,16 @@ def test_coarse_grids_and_few_numbers_are_no_rounding():
 def test_shells_carry_it(tmp_path):
     points, triangles = meshes.icosphere(2)
     path = tmp_path / "ball.off"
-    text = "\n".join(f"{x:.6g} {y:.6g} {z:.6g}" for x, y, z in 90.0 * points)
-    rows = "\n".join(f"3 {a} {b} {c}" for a, b, c in triangles)
-    path.write_text(f"OFF\n{len(points)} {len(triangles)} 0\n{text}\n{rows}\n")
+    rows = [f"{x:.6g} {y:.6g} {z:.6g}" for x, y, z in 90.0 * points]
+    rows += [f"3 {a} {b} {c}" for a, b, c in triangles]
+    path.write_text("\n".join([f"OFF\n{len(points)} {len(triangles)} 0", *rows]))
     shell = sp.Shell.from_file(path, "mm")
-    assert shell.rounding == pytest.approx(0.5e-4 * 1e-3)
-    assert shell.transformed(scale=3.0).rounding == pytest.approx(3 * shell.rounding)
-    assert pickle.loads(pickle.dumps(shell)).rounding == shell.rounding
-    again = sp.Shell(shell.vertices, shell.elements)
-    assert again.rounding == pytest.approx(shell.rounding)
+    for one, scale in (
+        (shell, 1),
+        (shell.transformed(scale=3.0), 3),
+        (pickle.loads(pickle.dumps(shell)), 1),
+        (sp.Shell(shell.vertices, shell.elements), 1),
+    ):
+        assert one.rounding == pytest.approx(scale * 0.5e-4 * 1e-3)
     assert sp.Shell(CUBE, CUBE_QUADS).rounding < 1e-7
     assert sp.Shell(points, triangles).rounding == 0.0

@@ -1,17 +1,18 @@
 """Each solid of a CAD file has its own outside; in a mesh, closed components may be cavities."""
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from sphshell_pin import Shell
 from sphshell_pin.shell import clean
 from sphshell_pin.shell.cleaned import CleanedSurface
+from tests import meshes
 
-from .surfaces import CUBE, CUBE_QUADS, joined, signed_volume
+from .surfaces import CUBE, CUBE_QUADS, expect, joined, signed_volume
 
 occ = pytest.importorskip("tests.parts.occ", exc_type=ImportError)
 shapes = pytest.importorskip("tests.shell.cad_shapes", exc_type=ImportError)
@@ -84,15 +85,14 @@ def surface_of(solids: list[Any], folder: Path) -> CleanedSurface:
 def test_every_solid_of_a_cad_file_has_its_own_outside(name: str, tmp_path: Path) -> None:
     solids = ASSEMBLIES[name]()
     surface = surface_of(solids, tmp_path)
-    health = surface.health
     volume = 1e-9 * sum(abs(occ.area_and_volume(solid)[1]) for solid in solids)
     assert signed_volume(surface) == pytest.approx(volume, rel=0.01)
-    assert health.volume == pytest.approx(signed_volume(surface))
-    assert health.closed_components == health.components == len(solids) + CAVITIES.get(name, 0)
-    assert health.cavities == CAVITIES.get(name, 0)
-    assert health.ok
+    cavities = CAVITIES.get(name, 0)
+    closed = len(solids) + cavities
     # Nor are the normals turned away from their elements.
-    assert health.opposing_normals == 0
+    figures = {"components": closed, "closed_components": closed, "opposing_normals": 0}
+    volume = signed_volume(surface)
+    expect(surface.health, ok=True, cavities=cavities, volume=volume, **figures)
 
 
 @pytest.mark.parametrize("name", ["nuts on a rod", "ball in a hollow ball", "void at the wall"])
@@ -102,8 +102,7 @@ def test_nor_does_a_mesh_of_them_lose_it(name: str, tmp_path: Path) -> None:
     health = clean(surface.vertices, surface.triangles).health
     volume = 1e-9 * sum(occ.area_and_volume(solid)[1] for solid in solids)
     assert health.volume == pytest.approx(volume, rel=0.01)
-    assert health.cavities == CAVITIES.get(name, 0)
-    assert health.ok
+    expect(health, ok=True, cavities=CAVITIES.get(name, 0))
 
 
 def test_a_sphere_on_the_joint_of_two_solids_touches_one_surface(tmp_path: Path) -> None:
@@ -120,64 +119,44 @@ def test_a_sphere_on_the_joint_of_two_solids_touches_one_surface(tmp_path: Path)
 
 def test_solids_that_touch_in_a_vertex_are_not_pinched(tmp_path: Path) -> None:
     blocks = [occ.box((0, 0, 0), (5, 5, 5)), occ.box((5, 5, 5), (9, 9, 9))]
-    shell = Shell.from_surface(surface_of(blocks, tmp_path), np.radians(30.0))
-    assert shell.health.ok
-    assert shell.num_elements == 24
+    expect(surface_of(blocks, tmp_path).health, ok=True, elements=24)
 
 
-def tube(outer: float, inner: float, low: float, high: float, sides: int, turn: float) -> Any:
-    """A prism about z with a hole; none if `inner` is 0."""
-    angle = turn + 2 * np.pi * np.arange(sides) / sides
+def tube(outer: float, inner: float, low: float, high: float, turn: float) -> Any:
+    """A prism of 24 sides about z with a hole; none if `inner` is 0."""
+    angle = turn + 2 * np.pi * np.arange(24) / 24
     ring = np.c_[np.cos(angle), np.sin(angle)]
-
-    def at(radius: float, z: float) -> np.ndarray:
-        return np.c_[radius * ring, np.full(sides, z)]
-
-    k, after = np.arange(sides), (np.arange(sides) + 1) % sides
-
-    def band(a: int, b: int) -> list[list[int]]:
-        return np.c_[a * sides + k, a * sides + after, b * sides + after, b * sides + k].tolist()
-
+    ends = [(outer, low), (outer, high), (inner, high), (inner, low)]
+    rails = [np.c_[radius * ring, np.full(24, z)] for radius, z in ends]
     if inner == 0.0:
-        lids = [k[::-1].tolist(), (sides + k).tolist()]
-        return np.concatenate([at(outer, low), at(outer, high)]), band(0, 1) + lids
-    points = [at(outer, low), at(outer, high), at(inner, high), at(inner, low)]
-    return np.concatenate(points), band(0, 1) + band(1, 2) + band(2, 3) + band(3, 0)
+        points, band = meshes.ribbon(rails[:2], closed=True)
+        return points, [*band.tolist(), range(23, -1, -1), range(24, 48)]
+    return meshes.ribbon([*rails, rails[0]], closed=True)
 
 
 def test_a_ring_on_a_rod_is_no_cavity_however_their_facets_lie() -> None:
     """Facets of the bore reach into the rod, and those of the rod into the ring."""
-    for turn in (0.0, 0.05, 0.1):
-        for high in (7.0, 10.0):
-            for outer in (1.2, 3.0):
-                ring = tube(outer, 1.0, 5.0, high, 24, turn)
-                surface = clean(*joined(tube(1.0, 0.0, 0.0, 10.0, 24, 0.0), ring))
-                assert surface.health.cavities == 0
-                if turn:  # else they have vertices in common
-                    assert surface.health.closed_components == 2
-                    assert surface.health.volume == pytest.approx(signed_volume(surface))
-                    area = 12 * np.sin(np.pi / 12)
-                    expected = area * (10.0 + (outer**2 - 1.0) * (high - 5.0))
-                    assert surface.health.volume == pytest.approx(expected)
+    rod = tube(1.0, 0.0, 0.0, 10.0, 0.0)
+    for turn, high, outer in itertools.product((0.0, 0.05, 0.1), (7.0, 10.0), (1.2, 3.0)):
+        surface = clean(*joined(rod, tube(outer, 1.0, 5.0, high, turn)))
+        assert surface.health.cavities == 0
+        if turn:  # else they have vertices in common
+            area = 12 * np.sin(np.pi / 12)
+            volume = area * (10.0 + (outer**2 - 1.0) * (high - 5.0))
+            expect(surface.health, closed_components=2, volume=volume)
+            assert signed_volume(surface) == pytest.approx(volume)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
 def test_what_is_partly_inside_is_a_solid_and_said(share: float) -> None:
     block = (0.5 * CUBE + np.array([0.26, 0.27, 1.0 - 0.5 * share]), CUBE_QUADS)
     surface = clean(*joined((CUBE, CUBE_QUADS), block))
-    health = surface.health
-    assert health.cavities == 0
-    assert health.overlapping_components == 1
+    expect(surface.health, "partly inside another", cavities=0, overlapping_components=1)
     assert signed_volume(surface) == pytest.approx(1.125)
-    assert any("partly inside another" in sentence for sentence in health.problems)
 
 
-def test_a_thin_walled_tank_has_a_cavity() -> None:
-    def inner(size: ArrayLike) -> Any:
-        return np.asarray(size) * (CUBE - 0.5) + 0.5, CUBE_QUADS
-
-    for wall in (1e-1, 1e-3, 1e-5):
-        surface = clean(*joined((CUBE, CUBE_QUADS), inner(1.0 - wall)))
-        assert surface.health.cavities == 1
-        assert surface.health.volume == pytest.approx(1.0 - (1.0 - wall) ** 3)
-        assert surface.health.ok
+@pytest.mark.parametrize("wall", [1e-1, 1e-3, 1e-5])
+def test_a_thin_walled_tank_has_a_cavity(wall: float) -> None:
+    inner = (1.0 - wall) * (CUBE - 0.5) + 0.5
+    health = clean(*joined((CUBE, CUBE_QUADS), (inner, CUBE_QUADS))).health
+    expect(health, ok=True, cavities=1, volume=1.0 - (1.0 - wall) ** 3)
