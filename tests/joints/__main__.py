@@ -34,12 +34,11 @@ def main() -> int:
     for verdict in of_files(options) if options.files else of_families(options):
         counts = Counter({name: len(rows) for name, rows in verdict.found().items()})
         found = ", ".join(f"{name} {count}" for name, count in counts.items())
-        spheres = len(verdict.radii)
-        print(f"{verdict.part:60s} {spheres:6d}  {found}", flush=True)
+        print(f"{verdict.part:60s} {verdict.spheres:6d}  {found}", flush=True)
         for name, rows in verdict.found().items():
             for text in rows[: options.show]:
                 print(f"    {name} at {text}")
-        number, asked, total = number + 1, asked + spheres, total + counts
+        number, asked, total = number + 1, asked + verdict.spheres, total + counts
         if not options.files and asked >= options.count:
             break
     print(f"\n{number} parts, {asked} spheres, {time.perf_counter() - begin:.0f} s; {dict(total)}")

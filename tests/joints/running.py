@@ -33,7 +33,7 @@ def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) ->
     """Walk over a STEP file, or the STL file of its solid; judged by its trimmed faces."""
     solid = read_step(path)
     trimmed = TrimmedSolid(solid)
-    asked = spheres_of(trimmed, count, rng)
+    centers, radii = spheres_of(trimmed, count, rng)
     chord = (CHORD if stl else STEP_CHORD) * trimmed.size
     if stl:
         mesh = write_stl(solid, path.with_suffix(".stl"), chord)
@@ -41,7 +41,7 @@ def walk_file(path: Path, name: str, count: int, rng: Rng, stl: bool = False) ->
     else:
         shell = sp.Shell.from_file(path)
     rough = 2 * chord  # OpenCASCADE's deflection is no guarantee
-    verdict = judge_solid(shell, trimmed, name, asked, DIGITS[stl] * trimmed.size, rough)
+    verdict = judge_solid(shell, trimmed, name, centers, radii, DIGITS[stl] * trimmed.size, rough)
     exact = sum(face.exact for face in shell.faces)
     verdict.part += f" (exact {exact} of {len(shell.faces)}, {100 * exact_share(shell):.1f} %)"
     return verdict

@@ -34,18 +34,12 @@ def read_step(path: Path) -> Solid:
     return reader.OneShape()
 
 
-@dataclass(frozen=True)
-class SolidSpheres:
-    """Centers (n, 3) and radii (n,) [mm], and the names of the joints."""
+def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> tuple[Array, Array]:
+    """Return up to `count` spheres over both sides of edges, corners and seams, on all sides.
 
-    centers: Array
-    radii: Array
-    joints: list[str]
-
-
-def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
-    """Return up to `count` spheres over both sides of edges, corners and seams, on all sides."""
-    centers, radii, joints = [], [], []
+    Their centers (n, 3) and radii (n,) [mm].
+    """
+    centers, radii = [], []
     sides = [
         (edge, k)
         for edge in solid.edges
@@ -84,14 +78,12 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> SolidSpheres:
         depth = r * np.exp(rng.uniform(*np.log(DEPTHS), per))
         centers.append(points + out * (r - depth)[:, None] * normal)
         radii.append(r)
-        joints += [_name(solid, edge, points[0])] * per
     at, r = np.concatenate(centers), np.concatenate(radii)
-    if len(solid.free):
-        away = np.array([np.linalg.norm(solid.free - c, axis=1).min() for c in at])
-        kept = away > r + solid.size / 100
-    else:
-        kept = np.ones(len(r), bool)
-    return SolidSpheres(at[kept], r[kept], [joints[k] for k in np.flatnonzero(kept)])
+    if not len(solid.free):
+        return at, r
+    away = np.array([np.linalg.norm(solid.free - c, axis=1).min() for c in at])
+    kept = away > r + solid.size / 100
+    return at[kept], r[kept]
 
 
 def _side(solid: TrimmedSolid, edge: Edge, k: int) -> float:
@@ -102,40 +94,32 @@ def _side(solid: TrimmedSolid, edge: Edge, k: int) -> float:
     return -1.0 if edge.left[0] == edge.left[1] else 1.0
 
 
-def _name(solid: TrimmedSolid, edge: Edge, point: Array) -> str:
-    kinds = sorted(solid.surfaces[k].kind.lower() or "free" for k in edge.faces)
-    if len(kinds) == 1:
-        return f"{kinds[0]} seam"
-    normals = [solid.surfaces[k].closest(point[None])[1][0] for k in edge.faces[:2]]
-    sine = float(np.linalg.norm(np.cross(*normals)))
-    return f"{'-'.join(kinds)} {'tangent' if sine < 1e-6 else 'nearly' if sine < 0.03 else 'angle'}"
-
-
-def judge_solid(shell, solid, name, asked, digits, rough):
+def judge_solid(shell, solid, name, centers, radii, digits, rough):
     """Compare the contacts of every sphere with the local minima of the distance.
 
     digits, rough : tolerances of depths on exact faces, beside 1e-10 r, and on other ones [mm]
     """
-    truth = solid.minima(asked.centers, asked.radii)
+    truth = solid.minima(centers, radii)
     exact = exact_elements(shell)
-    out = Verdict(name, asked.centers * MM, asked.radii * MM, asked.joints)
-    for row, (center, r) in enumerate(zip(asked.centers, asked.radii.tolist(), strict=True)):
+    out = Verdict(name, len(radii))
+    for here, center, r in zip(truth, centers, radii.tolist(), strict=True):
         terms = shell.contacts(center * MM, r * MM).terms
         element = terms.element
         found = Found(terms.point / MM, terms.normal, terms.depth / MM, terms.weight)
         for strict in (True, False):
-            fault, detail = _fault(truth[row], found, r, 1e-10 * r + digits if strict else rough)
+            fault, detail = _fault(here, found, r, 1e-10 * r + digits if strict else rough)
             if not fault:
                 break
             # Where a face is not exact, the chord error is allowed.
             if strict:
-                near = [truth[row].points] if len(truth[row].points) else []
+                near = [here.points] if len(here.points) else []
                 places = np.concatenate([*near, found.points])
                 elements = [element, *(_elements_at(shell, p, rough) for p in places)]
                 if exact[np.concatenate(elements)].all():
                     break
         if fault:
-            out.add(fault, row, detail)
+            where = f"center {(center * MM).tolist()}, radius {r * MM}"
+            out.faults[fault].append(f"{where}: {detail}")
     return out
 
 

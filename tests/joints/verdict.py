@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sphshell_pin as sp
-from sphshell_pin.base.arrays import Array
 
 MM = 1e-3
 
@@ -18,7 +17,7 @@ class Verdict:
 
     Attributes
     ----------
-    centers, radii : (n, 3) and (n,) [m]; joints : what meets there, one a sphere
+    spheres : how many
     faults : descriptions of spheres by the name of the fault:
         lost, no contact where the sphere touches
         missing, a minimum of the distance has no contact
@@ -29,14 +28,8 @@ class Verdict:
     """
 
     part: str
-    centers: Array
-    radii: Array
-    joints: list[str]
+    spheres: int
     faults: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
-
-    def add(self, fault: str, row: int, detail: str) -> None:
-        where = f"center {self.centers[row].tolist()}, radius {float(self.radii[row])}"
-        self.faults[fault].append(f"{self.joints[row]}: {where}: {detail}")
 
     def found(self) -> dict[str, list[str]]:
         """Faults, with a description of each sphere."""

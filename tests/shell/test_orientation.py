@@ -116,10 +116,10 @@ def test_normals_follow_the_winding():
 
 
 def test_bad_normals_are_mended_and_reported():
-    normals = np.array([[[0, 0, 1e-200], [0, 0, 0], [np.nan, 0, 1], [0.6, 0, 0.8]]])
+    normals = np.array([[[0, 0, 1e-200], [0, 0, 0], [np.nan, 0, 1], [0.96, 0, 0.28]]])
     surface = clean(*plate(1), normals)
-    figures = {"rescaled_normals": 1, "missing_normals": 2}
-    angle = np.arccos(0.8)
+    figures = {"rescaled_normals": 1, "missing_normals": 2, "opposing_normals": 0}
+    angle = np.arccos(0.28)
     expect(surface.health, "zero or not finite", largest_normal_angle=angle, **figures)
     assert np.linalg.norm(surface.normals, axis=2) == pytest.approx(1.0)
 

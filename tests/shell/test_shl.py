@@ -146,7 +146,7 @@ FLAT = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
         ({0: "8 6"}, 1, "header"),
         ({0: "8.5 6 1"}, 1, "whole number"),
         ({0: "Version: 3"}, 1, "version 3"),
-        (["0 0 1.0"], 1, "no surface"),
+        ({0: "8 0 1.0"}, 1, "no surface"),
         (["solid cube"], None, "no numbers"),
         (FLAT, None, "no element is left"),
     ],
