@@ -1,6 +1,5 @@
 #include "contact/query/components.hpp"
 
-#include <numeric>
 #include <type_traits>
 
 #include "contact/query/closest_on_cell.hpp"
@@ -164,21 +163,12 @@ void Components::reset_components(std::size_t minima) {
 template <class Probe>
 void Components::connect_equal_points(const Probe& probe, const std::vector<Minimum>& minima) {
   const double same = kSamePlace * probe.scale();
-  const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
-  // Sorted along x only neighbors are compared: sheets seldom have many minima.
-  by_x_.resize(minima.size());
-  std::iota(by_x_.begin(), by_x_.end(), 0);
-  std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return point(i).x() < point(j).x(); });
-  for (std::size_t a = 0; a < by_x_.size(); ++a)
-    for (std::size_t b = a + 1; b < by_x_.size(); ++b) {
-      if (point(by_x_[b]).x() - point(by_x_[a]).x() > same) break;
-      if ((point(by_x_[a]) - point(by_x_[b])).squaredNorm() > same * same) continue;
-      const auto [deeper, other] = std::minmax(by_x_[a], by_x_[b]);
-      const int facet = minima[other].facet;
-      components_[deeper].open.push_back({minima[other].contact.depth,
-                                          SaddleCandidate::Kind::CommonPoint, deeper, facet, facet,
-                                          0, 0, other});
-    }
+  for_each_near(minima, same, by_x_, [&](int deeper, int other) {
+    const int facet = minima[other].facet;
+    components_[deeper].open.push_back({minima[other].contact.depth,
+                                        SaddleCandidate::Kind::CommonPoint, deeper, facet, facet, 0,
+                                        0, other});
+  });
 }
 
 // Order of the heap: shallower ones below; of equal ones that of the higher facet and side.
@@ -186,6 +176,11 @@ bool Components::lower(const SaddleCandidate& a, const SaddleCandidate& b) {
   return a.depth != b.depth   ? a.depth < b.depth
          : a.facet != b.facet ? a.facet > b.facet
                               : a.side > b.side;
+}
+
+void Components::push(const SaddleCandidate& candidate, std::vector<SaddleCandidate>& heap) {
+  heap.push_back(candidate);
+  std::push_heap(heap.begin(), heap.end(), lower);
 }
 
 // Pushes the ways out of a cell: to the other fans of a vertex where sheets meet in that point
@@ -199,16 +194,15 @@ void Components::add_candidates(const Shell& shell, const Probe& probe, int f, i
   std::vector<SaddleCandidate>& open = components_[component].open;
   const Topology& topology = shell.topology();
   for (int k = 0; k < 3 && !topology.pinches.empty(); ++k) {
-    const Pinch* pinch = topology.pinch_at(shell.triangles()[shell.triangle_of_facet(f)][k]);
+    const Pinch* pinch = topology.pinch_at(shell.vertex(shell.half_edge(3 * f + k)));
     const double depth = probe.depth(facet.corner[k]);
     if (pinch == nullptr || depth <= 0) continue;
     const int name = shell.facet_half_edge(pinch->fans[0][0]);
     for (const std::vector<int>& fan : pinch->fans) {
       const int to = triangle_of(shell.facet_half_edge(fan[0]));
       if (belongs_to(to, component)) continue;
-      open.push_back(
-          {depth, SaddleCandidate::Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0});
-      std::push_heap(open.begin(), open.end(), lower);
+      push({depth, SaddleCandidate::Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0},
+           open);
     }
   }
   for (int k = 0; k < 3; ++k) {
@@ -221,9 +215,9 @@ void Components::add_candidates(const Shell& shell, const Probe& probe, int f, i
     if (bound <= 0) continue;
     // A side is seen from the first of its triangles, so that a point has one name.
     const auto add_candidate = [&](int h, int name) {
-      open.push_back({bound, SaddleCandidate::Kind::Bound, cell, triangle_of(h), triangle_of(name),
-                      side_of(name), 0, 0});
-      std::push_heap(open.begin(), open.end(), lower);
+      push({bound, SaddleCandidate::Kind::Bound, cell, triangle_of(h), triangle_of(name),
+            side_of(name), 0, 0},
+           open);
     };
     const int here = 3 * f + k;
     if (beyond >= 0) {
@@ -231,7 +225,7 @@ void Components::add_candidates(const Shell& shell, const Probe& probe, int f, i
       add_candidate(beyond, first ? here : beyond);
       continue;
     }
-    const int h = 3 * shell.triangle_of_facet(f) + k;
+    const int h = shell.half_edge(here);
     const Edge& edge = topology.edge_at(h);
     const int name = shell.facet_half_edge(topology.incidence[edge.begin]);
     for (int i = edge.begin; i < edge.begin + edge.count; ++i)
@@ -254,11 +248,8 @@ void Components::grow_components(const Shell& shell, const Probe& probe, std::si
       while (component >= 0 && components_[component].cells < size)
         component = expand(shell, probe, component);
     }
-    active_.erase(std::remove_if(active_.begin(), active_.end(),
-                                 [&](int p) {
-                                   return root_of(parent_, p) != p || components_[p].open.empty();
-                                 }),
-                  active_.end());
+    erase_if(active_,
+             [&](int p) { return root_of(parent_, p) != p || components_[p].open.empty(); });
   }
 }
 
@@ -284,8 +275,7 @@ int Components::expand(const Shell& shell, const Probe& probe, int component) {
     candidate.t = foot.t;
     candidate.depth = probe.depth(foot.point);
     candidate.kind = SaddleCandidate::Kind::Side;
-    open.push_back(candidate);
-    std::push_heap(open.begin(), open.end(), lower);
+    push(candidate, open);
     return component;
   }
   bool added = false;
@@ -305,10 +295,7 @@ int Components::expand(const Shell& shell, const Probe& probe, int component) {
   const int kept =
       components_[component].open.size() < components_[other].open.size() ? other : component;
   const int gone = kept == component ? other : component;
-  for (const SaddleCandidate& more : components_[gone].open) {
-    components_[kept].open.push_back(more);
-    std::push_heap(components_[kept].open.begin(), components_[kept].open.end(), lower);
-  }
+  for (const SaddleCandidate& more : components_[gone].open) push(more, components_[kept].open);
   components_[kept].cells += components_[gone].cells;
   components_[gone].open.clear();
   parent_[gone] = kept;

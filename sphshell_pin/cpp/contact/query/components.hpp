@@ -73,6 +73,7 @@ class Components {
 
   // Whether a comes after b.
   static bool lower(const SaddleCandidate& a, const SaddleCandidate& b);
+  static void push(const SaddleCandidate& candidate, std::vector<SaddleCandidate>& heap);
   // Whether a facet is in a component, named by its first cell, already.
   bool belongs_to(int facet, int component);
   template <class Probe>

@@ -34,11 +34,8 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     broad.find(shell, surface.cones(), surface.bulge(), probe, cells);
     if (!faces.empty()) feet_.clear(surface);
   }
-  const auto prefetch_cell = [&](int f) {
-    for (int line = 0; line < int(sizeof(CurvedFacet)); line += 64)
-      prefetch(reinterpret_cast<const char*>(&surface.facets()[f]) + line);
-  };
-  if (!sphere) std::for_each(broad.candidates.begin(), broad.candidates.end(), prefetch_cell);
+  for (std::size_t i = 0; i < broad.candidates.size() && !sphere; ++i)
+    prefetch_all(surface.facets()[broad.candidates[i]]);
   for (int f : broad.candidates) {
     if (!faces.empty() && faces[f].closed) {
       if constexpr (!sphere) feet_.add_lowest(shell, f, probe, want_dn_dc, minima);
@@ -55,7 +52,7 @@ void CurvedQuery::find(const Shell& shell, const Probe& probe, BroadPhase& broad
     }();
     if (outlook.empty()) continue;
     // Control points are read in the next loop; until then they come into the cache.
-    if (sphere) prefetch_cell(f);
+    if (sphere) prefetch_all(surface.facets()[f]);
     outlooks_.push_back(outlook);
   }
   // The order of minima is made unique later, by Components::merge().

@@ -1,7 +1,6 @@
 #include "contact/query/flat_query.hpp"
 
 #include <map>
-#include <numeric>
 
 #include "contact/query/regions.hpp"
 
@@ -68,18 +67,13 @@ void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
     for (int k = 0; k < 3; ++k) {
       // Each edge and each vertex is owned by one facet, which alone reports it.
       if (facet.owned.twin[k] != kNotOwned && side[k].not_within && !side[k].past_first &&
-          !side[k].past_second) {
-        const Vec3& a = facet.corner[k];
-        if (sphere.reaches(a + side[k].t * facet.side(k)) &&
-            edge_is_minimum(shell, facet.owned.twin[k], center, tolerance2)) {
-          const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
-          edges_.push_back({f, k, t[k], t[next_corner(k)]});
-        }
-      }
+          !side[k].past_second && sphere.reaches(facet.corner[k] + side[k].t * facet.side(k)) &&
+          edge_is_minimum(shell, facet.owned.twin[k], center, tolerance2))
+        edges_.push_back(3 * f + k);
       if (facet.owned.vertex[k] >= 0 && side[k].before && side[previous_corner(k)].after &&
           sphere.reaches(facet.corner[k]) &&
           vertex_is_minimum(shell, facet.owned.vertex[k], center, sphere.tolerance))
-        vertices_.push_back({f, k, facet.owned.vertex[k]});
+        vertices_.push_back(3 * f + k);
     }
   }
 }
@@ -92,30 +86,20 @@ void FlatQuery::drop_neighbors(const Shell& shell) {
   // list are dropped.
   taken_edges_.clear();
   taken_vertices_.clear();
-  for (int face : faces_) {
-    const Triangle& t = shell.triangles()[shell.triangle_of_facet(face)];
-    for (int k = 0; k < 3; ++k) {
-      taken_edges_.push_back(std::minmax(t[k], t[next_corner(k)]));
-      taken_vertices_.push_back(t[k]);
-    }
-  }
+  const auto edge_of = [&](int h) { return shell.topology().edge_of[shell.half_edge(h)]; };
+  const auto vertex_of = [&](int corner) { return shell.vertex(shell.half_edge(corner)); };
+  const auto is_in = [](const std::vector<int>& sorted, int one) {
+    return std::binary_search(sorted.begin(), sorted.end(), one);
+  };
+  for (int face : faces_)
+    for (int h = 3 * face; h < 3 * face + 3; ++h)
+      taken_edges_.push_back(edge_of(h)), taken_vertices_.push_back(vertex_of(h));
   std::sort(taken_edges_.begin(), taken_edges_.end());
-  // Vertex numbers, lower one first, name an edge.
-  const auto edge_taken = [&](const OnEdge& e) {
-    return std::binary_search(taken_edges_.begin(), taken_edges_.end(),
-                              std::pair<int, int>(std::minmax(e.from, e.to)));
-  };
-  edges_.erase(std::remove_if(edges_.begin(), edges_.end(), edge_taken), edges_.end());
-  for (const OnEdge& e : edges_) {
-    taken_vertices_.push_back(e.from);
-    taken_vertices_.push_back(e.to);
-  }
+  erase_if(edges_, [&](int h) { return is_in(taken_edges_, edge_of(h)); });
+  for (int h : edges_)
+    for (int corner : {h, corner_after(h)}) taken_vertices_.push_back(vertex_of(corner));
   std::sort(taken_vertices_.begin(), taken_vertices_.end());
-  const auto vertex_taken = [&](const OnVertex& v) {
-    return std::binary_search(taken_vertices_.begin(), taken_vertices_.end(), v.vertex);
-  };
-  vertices_.erase(std::remove_if(vertices_.begin(), vertices_.end(), vertex_taken),
-                  vertices_.end());
+  erase_if(vertices_, [&](int corner) { return is_in(taken_vertices_, vertex_of(corner)); });
 }
 
 // Closed forms: dx/dc is the projection on the plane for a face (its normal stays), on the line for
@@ -145,19 +129,18 @@ void FlatQuery::add_minima(const Shell& shell, const Sphere& sphere, bool want_d
          Feature::Face},
         height < 0, Mat3::Zero());
   }
-  for (const OnEdge& on : edges_) {
-    const Facet& facet = facets[on.facet];
-    const Vec3& a = facet.corner[on.side];
-    const Vec3 along = facet.side(on.side);
+  for (const int h : edges_) {
+    const int f = triangle_of(h), k = side_of(h);
+    const Facet& facet = facets[f];
+    const Vec3 &a = facet.corner[k], along = facet.side(k);
     const double t = std::clamp((center - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
-    add(on.facet, on.side,
-        contact_at(a + t * along, facet.normal, sphere, facet.element, Feature::Edge), false,
+    add(f, k, contact_at(a + t * along, facet.normal, sphere, facet.element, Feature::Edge), false,
         along * along.transpose() / along.squaredNorm());
   }
-  for (const OnVertex& on : vertices_) {
-    const Facet& facet = facets[on.facet];
-    add(on.facet, on.corner,
-        contact_at(shell.vertices()[on.vertex], facet.normal, sphere, facet.element,
+  for (const int corner : vertices_) {
+    const Facet& facet = facets[triangle_of(corner)];
+    add(triangle_of(corner), side_of(corner),
+        contact_at(facet.corner[side_of(corner)], facet.normal, sphere, facet.element,
                    Feature::Vertex),
         false, Mat3::Zero());
   }
@@ -172,20 +155,12 @@ void FlatQuery::remove_dropped(std::vector<Minimum>& minima) const {
 
 // The simplest feature wins (face, edge, vertex: the order in which minima were listed).
 void FlatQuery::merge_equal_points(double tolerance, std::vector<Minimum>& minima) {
-  by_x_.resize(minima.size());
-  std::iota(by_x_.begin(), by_x_.end(), 0);
-  const auto x = [&](int i) { return minima[i].contact.point.x(); };
-  std::sort(by_x_.begin(), by_x_.end(), [&](int i, int j) { return x(i) < x(j); });
   dropped_.assign(minima.size(), 0);
-  for (std::size_t a = 0; a < by_x_.size(); ++a)
-    for (std::size_t b = a + 1; b < by_x_.size() && x(by_x_[b]) - x(by_x_[a]) <= tolerance; ++b) {
-      const auto [first, second] = std::minmax(by_x_[a], by_x_[b]);
-      Contact& kept = minima[first].contact;
-      const Contact& other = minima[second].contact;
-      if ((kept.point - other.point).squaredNorm() > tolerance * tolerance) continue;
-      kept.element = std::min(kept.element, other.element);
-      dropped_[second] = 1;
-    }
+  for_each_near(minima, tolerance, by_x_, [&](int first, int second) {
+    int& element = minima[first].contact.element;
+    element = std::min(element, minima[second].contact.element);
+    dropped_[second] = 1;
+  });
   remove_dropped(minima);
 }
 

@@ -15,14 +15,6 @@ class FlatQuery {
             std::vector<Minimum>& minima);
 
  private:
-  // An edge or a vertex that may hold the closest point.
-  struct OnEdge {
-    int facet, side, from, to;  // from, to: its vertices
-  };
-  struct OnVertex {
-    int facet, corner, vertex;
-  };
-
   // The features whose normal cone holds the center; and those that a simpler one makes
   // superfluous.
   void find_features(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates);
@@ -47,11 +39,9 @@ class FlatQuery {
     int saddles;
   };
 
-  std::vector<int> faces_;  // facets that the center projects into
-  std::vector<OnEdge> edges_;
-  std::vector<OnVertex> vertices_;
-  std::vector<std::pair<int, int>> taken_edges_;
-  std::vector<int> taken_vertices_, by_x_, at_point_;
+  std::vector<int> faces_;             // facets that the center projects into
+  std::vector<int> edges_, vertices_;  // 3 facet + k: those that may hold the closest point
+  std::vector<int> taken_edges_, taken_vertices_, by_x_, at_point_;
   std::vector<char> dropped_;
   std::vector<Pinched> pinched_;
 };

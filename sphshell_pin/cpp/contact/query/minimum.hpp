@@ -1,6 +1,8 @@
 // Minima of the distance as the queries find them, before a shell's side is looked at.
 #pragma once
 
+#include <numeric>
+
 #include "contact/query/contact.hpp"
 #include "contact/query/tolerances.hpp"
 #include "shell/shell.hpp"
@@ -39,6 +41,25 @@ inline Contact contact_at(const Vec3& point, const Vec3& outward, const Sphere& 
 inline Contact contact_at(const Vec3& point, const Vec3&, const Plane& plane, int element,
                           Feature feature) {
   return {point, plane.normal, plane.depth(point), element, feature};
+}
+
+// Calls visit(i, j), i < j, for minima that are no farther apart than `tolerance`; by_x: scratch.
+// Sorted along x only neighbors are compared.
+template <class Visit>
+void for_each_near(const std::vector<Minimum>& minima, double tolerance, std::vector<int>& by_x,
+                   Visit&& visit) {
+  const auto point = [&](int i) -> const Vec3& { return minima[i].contact.point; };
+  by_x.resize(minima.size());
+  std::iota(by_x.begin(), by_x.end(), 0);
+  std::sort(by_x.begin(), by_x.end(), [&](int i, int j) { return point(i).x() < point(j).x(); });
+  for (std::size_t a = 0; a < by_x.size(); ++a)
+    for (std::size_t b = a + 1; b < by_x.size(); ++b) {
+      const Vec3 apart = point(by_x[b]) - point(by_x[a]);
+      if (apart.x() > tolerance) break;
+      if (apart.squaredNorm() > tolerance * tolerance) continue;
+      const auto [first, second] = std::minmax(by_x[a], by_x[b]);
+      visit(first, second);
+    }
 }
 
 // What a contact keeps of how its point follows the probe: how the normal changes with the center,
