@@ -150,12 +150,12 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
     find_elements(shell, sphere, parts_->broad, contacts);
     return contacts;
   }
-  std::vector<Minimum>& minima = parts_->minima;
-  minima.clear();
+  parts_->minima.clear();
+  const Search<Sphere> search{shell, sphere, parts_->want_dn_dc, parts_->minima};
   if (method == Method::Smooth)
-    parts_->curved.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+    parts_->curved.find(search, parts_->broad);
   else
-    parts_->flat.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+    parts_->flat.find(search, parts_->broad);
   return list(shell, sphere, rings);
 }
 
@@ -164,7 +164,8 @@ const std::vector<Contact>& Query::find_below(const Shell& shell, const Vec3& no
   contacts.clear();
   parts_->minima.clear();
   const Plane plane{normal, offset, shell.size(), kRoundOff * shell.size()};
-  parts_->curved.find(shell, plane, parts_->broad, parts_->want_dn_dc, parts_->minima);
+  parts_->curved.find(Search<Plane>{shell, plane, parts_->want_dn_dc, parts_->minima},
+                      parts_->broad);
   return list(shell, plane, false);
 }
 
