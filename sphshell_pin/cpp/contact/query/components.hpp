@@ -137,10 +137,10 @@ class Components {
  private:
   // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
   // the closest point of both.
+  // Bound: depth is an upper bound from the chord. Side: exact. CommonPoint: of two minima at one
+  // place.
+  enum class Kind { Bound, Side, CommonPoint };
   struct SaddleCandidate {
-    // Bound: depth is an upper bound from the chord. Side: exact. CommonPoint: of two minima at one
-    // place.
-    enum class Kind { Bound, Side, CommonPoint };
     double depth;
     Kind kind;
     int from, to;  // cells; `to` is a facet until the candidate is used
@@ -163,6 +163,11 @@ class Components {
     const SideFoot foot = nearest_on_side(search.shell, f, k, search.probe);
     return search.at(f, k, Feature::Edge, foot.point, search.shell.facets()[f].normal,
                      [&] { return dx_dc_of(search.shell, f, k, foot, search.probe); });
+  }
+
+  // A side is seen from the first of its triangles, so that a point has one name.
+  static int name_of(const Shell& shell, int h, int beyond) {
+    return shell.half_edge(h) < shell.half_edge(beyond) ? h : beyond;
   }
 
   // Union-find with path halving.
@@ -203,18 +208,10 @@ class Components {
     const auto& [shell, probe, want_dn_dc, minima] = search;
     const int h = way.half_edge;
     const int beyond = shell.curved()->cells()[triangle_of(h)].beyond[side_of(h)];
-    const bool first =
-        shell.triangle_of_facet(triangle_of(h)) < shell.triangle_of_facet(triangle_of(beyond));
-    const int name = first ? h : beyond, f = triangle_of(name), k = side_of(name);
+    const int name = name_of(shell, h, beyond), f = triangle_of(name), k = side_of(name);
     const SideFoot foot = nearest_on_side(shell, f, k, probe);
-    return {probe.depth(foot.point),
-            SaddleCandidate::Kind::Side,
-            cells_.find(way.from),
-            cells_.find(way.to),
-            f,
-            k,
-            foot.t,
-            0};
+    const int from = cells_.find(way.from), to = cells_.find(way.to);
+    return {probe.depth(foot.point), Kind::Side, from, to, f, k, foot.t, 0};
   }
 
   // Each cell a component of its own; the first ones are those of the minima.
@@ -245,8 +242,7 @@ class Components {
       for (const std::vector<int>& fan : pinch->fans) {
         const int to = triangle_of(shell.facet_half_edge(fan[0]));
         if (belongs_to(to, component)) continue;
-        push({depth, SaddleCandidate::Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0},
-             open);
+        push({depth, Kind::Side, cell, to, triangle_of(name), side_of(name), 0, 0}, open);
       }
     }
     for (int k = 0; k < 3; ++k) {
@@ -257,17 +253,13 @@ class Components {
         continue;
       const double bound = probe.bound_along(facet.corner[k], facet.side(k), bounds.bulge);
       if (bound <= 0) continue;
-      // A side is seen from the first of its triangles, so that a point has one name.
       const auto add_candidate = [&](int h, int name) {
-        push({bound, SaddleCandidate::Kind::Bound, cell, triangle_of(h), triangle_of(name),
-              side_of(name), 0, 0},
+        push({bound, Kind::Bound, cell, triangle_of(h), triangle_of(name), side_of(name), 0, 0},
              open);
       };
       const int here = 3 * f + k;
       if (beyond >= 0) {
-        const bool first =
-            shell.triangle_of_facet(f) < shell.triangle_of_facet(triangle_of(beyond));
-        add_candidate(beyond, first ? here : beyond);
+        add_candidate(beyond, name_of(shell, here, beyond));
         continue;
       }
       const int h = shell.half_edge(here);
@@ -285,9 +277,8 @@ class Components {
     const double same = kSamePlace * probe.scale();
     for_each_near(minima, same, by_x_, [&](int deeper, int other) {
       const int facet = minima[other].facet;
-      components_[deeper].open.push_back({minima[other].contact.depth,
-                                          SaddleCandidate::Kind::CommonPoint, deeper, facet, facet,
-                                          0, 0, other});
+      components_[deeper].open.push_back(
+          {minima[other].contact.depth, Kind::CommonPoint, deeper, facet, facet, 0, 0, other});
     });
   }
 
@@ -329,11 +320,11 @@ class Components {
     // Reached meanwhile by another way: this one closes a loop.
     if (belongs_to(candidate.to, component)) return component;
     // Put back with its exact depth: it may not be the highest any more.
-    if (candidate.kind == SaddleCandidate::Kind::Bound) {
+    if (candidate.kind == Kind::Bound) {
       const SideFoot foot = nearest_on_side(shell, candidate.facet, candidate.side, probe);
       candidate.t = foot.t;
       candidate.depth = probe.depth(foot.point);
-      candidate.kind = SaddleCandidate::Kind::Side;
+      candidate.kind = Kind::Side;
       push(candidate, open);
       return component;
     }
@@ -395,7 +386,7 @@ class Components {
           level_[deeper].extend(level_[shallower]);
         continue;
       }
-      Minimum saddle = candidate.kind == SaddleCandidate::Kind::Side
+      Minimum saddle = candidate.kind == Kind::Side
                            ? on_side(search, candidate.facet, candidate.side, candidate.t)
                            : minima[candidate.minimum];
       // At the moment at which it is as far as the radius, to rounding.
