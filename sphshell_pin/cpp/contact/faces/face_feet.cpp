@@ -6,7 +6,6 @@
 #include "contact/query/closest_on_side.hpp"
 
 namespace sphshell {
-namespace {
 
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
@@ -15,12 +14,10 @@ constexpr int kMostRepeats = 20;
 // rounding of a distance, below which its sign says nothing.
 constexpr double kLeastSlope = 1e-7;
 
-}  // namespace
-
 // The facets near the point are looked through; where it may be anywhere around an axis, those near
 // the sphere, and towards each of them.
-void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
-                           std::vector<Minimum>& minima) {
+void FaceFeet::add_closest(const Search<Sphere>& search, int face) {
+  const auto& [shell, sphere, want_dn_dc, minima] = search;
   const CurvedShell& surface = *shell.curved();
   const Region& region = surface.face_search()->of_face[face];
   const Primitive& shape = surface.faces().shapes[face];
@@ -70,8 +67,8 @@ void FaceFeet::clear(const CurvedShell& surface) {
   round_ = 1;
 }
 
-void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool want_dx_dn,
-                          std::vector<Minimum>& minima) {
+void FaceFeet::add_lowest(const Search<Plane>& search, int f) {
+  const auto& [shell, plane, want_dx_dn, minima] = search;
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Primitive& shape = surface.faces().shapes[cell.face];
@@ -96,25 +93,23 @@ void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool wa
       torus ? shape.parameters(point, shell.size()) : Eigen::Vector2d(0, 0);
   if (!holds(shell, f, {point, outward, point, place}, plane.tolerance + surface.gap())) return;
   if (!anywhere) claimed_[cell.face] = round_;
-  const int element = shell.facets()[f].element;
-  Contact contact = contact_at(point, outward, plane, element, Feature::Face);
-  if (want_dx_dn) {
+  Minimum lowest = search.at(f, 0, Feature::Face, point, outward, [&]() -> Mat3 {
     const Mat3 across = Mat3::Identity() - n * n.transpose();
-    contact.dn_dc = -(torus ? shape.second : shape.radius) * across;
+    Mat3 by = -(torus ? shape.second : shape.radius) * across;
     if (torus && !anywhere)
-      contact.dn_dc -= shape.radius / slant * (Mat3::Identity() - out * out.transpose()) *
-                       (Mat3::Identity() - axis * axis.transpose()) * across;
-  }
-  minima.push_back({contact, f, 0, cell.sign < 0});
+      by -= shape.radius / slant * (Mat3::Identity() - out * out.transpose()) *
+            (Mat3::Identity() - axis * axis.transpose()) * across;
+    return by;
+  });
+  lowest.behind = cell.sign < 0;
+  minima.push_back(lowest);
 }
-
-namespace {
 
 // Whether a point is on the inner side of what bounds a facet on its side k. Inner: facets of a
 // face are divided by straight lines of its parameters, those of planes and spheres by the planes
 // through their chords and the face's normals. Border: by what divides the joint's faces. Cubic: by
 // the curve itself.
-bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tolerance) {
+static bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Facet& facet = shell.facets()[f];
@@ -145,8 +140,6 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
            -tolerance);
 }
 
-}  // namespace
-
 bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
@@ -157,12 +150,12 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   // Beyond the corner of a needle both of its lines may be nearer than the tolerance.
   if (surface.faces().shapes[cell.face].kind == FaceKind::Plane)
     for (int k = 0; k < 3; ++k) {
-      const Vec3* corner = shell.facets()[f].corner;
+      const Facet& facet = shell.facets()[f];
       const int before = previous_corner(k);
       if (cell.side[k] != FaceCell::Side::Inner || cell.side[before] != FaceCell::Side::Inner)
         continue;
-      const Vec3 from = at.point - corner[k];
-      const Vec3 ahead = corner[next_corner(k)] - corner[k], back = corner[before] - corner[k];
+      const Vec3 from = at.point - facet.corner[k], ahead = facet.side(k),
+                 back = facet.corner[before] - facet.corner[k];
       if (from.dot(ahead) >= 0 && from.dot(back) >= 0) continue;
       if (from.dot(ahead.normalized() + back.normalized()) < -tolerance) return false;
     }
@@ -389,7 +382,7 @@ Vec3 inward(const Shell& shell, int h, double t, const Vec3& point, const Vec3& 
     face->distance(point, n);
     // The facet's own normal leans any way where its chords leave the tube of a torus.
     in = surface.face_cells()[f].sign * n.cross(along);
-    if (along.dot(facet.corner[next_corner(k)] - facet.corner[k]) < 0) in = -in;
+    if (along.dot(facet.side(k)) < 0) in = -in;
   } else {
     in = surface.facets()[f].patch(facet).inward(k, t);
   }
