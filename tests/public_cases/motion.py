@@ -11,6 +11,7 @@ from tests.public_cases.shapes import terrain
 
 GRAVITY = 9.81
 HARD, ELASTIC = sp.HuntCrossleyLaw(1e6, 1.5, 0.5), sp.HuntCrossleyLaw(1e6, 1.5, 0.0)
+DEPTH = HARD.depth_at(GRAVITY)  # of a ball of 1 kg at rest
 SQUARE = sp.Shell(*meshes.grid_plate(16, 16, 8.0))
 
 
@@ -30,17 +31,17 @@ def ramp(strips: int) -> tuple[float, float]:
 
     The lever of friction is the distance of center and contact point, r - d.
     """
-    slope, radius, stiffness = np.radians(20), 0.1, 1e6
+    slope, radius = np.radians(20), 0.1
     along = np.array([np.cos(slope), 0.0, -np.sin(slope)])
     normal = np.array([np.sin(slope), 0.0, np.cos(slope)])
     vertices = [s * along + [0, y, 0] for s in np.linspace(-2, 2, strips + 1) for y in (-1, 1)]
     k = 2 * np.arange(strips)[:, None]
     elements = np.vstack((k + [0, 2, 3], k + [0, 3, 1]))
-    law, friction = sp.HuntCrossleyLaw(stiffness, 1.5, 0.2), sp.BristleFriction(0.6, 0.5, 1e5, 20.0)
+    law, friction = sp.HuntCrossleyLaw(1e6, 1.5, 0.2), sp.BristleFriction(0.6, 0.5, 1e5, 20.0)
     scene = models.on_shell(
         models.ball(radius=radius), sp.Shell(vertices, elements), law, friction, radius=radius
     )
-    depth = (GRAVITY * np.cos(slope) / stiffness) ** (2 / 3)
+    depth = law.depth_at(GRAVITY * np.cos(slope))
     start = -1.5 * along + 0.3 * np.eye(3)[1] + (radius - depth) * normal
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
         models.free_q(start), duration=1.0, record_dt=0.01
@@ -70,9 +71,11 @@ def over_the_seam_of_two_cubes() -> float:
     )
     law, friction = sp.HuntCrossleyLaw(1e5, 1.5, 0.3), sp.CoulombFriction(0.3, 0.3, 0.01, 0.02)
     scene = models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
-    depth = (GRAVITY / 1e5) ** (2 / 3)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(5e-5)).run(
-        models.free_q([0, 0, 0.1 - depth]), v0=[5, 0, 0, 0, 50, 0], duration=0.5, record_dt=1e-3
+        models.free_q([0, 0, 0.1 - law.depth_at(GRAVITY)]),
+        v0=[5, 0, 0, 0, 50, 0],
+        duration=0.5,
+        record_dt=1e-3,
     )
     return float(np.ptp(result.q[:, 2]))
 
@@ -123,7 +126,7 @@ def pinched_rod() -> float:
     for name in ("left", "right"):
         pad = sp.Sphere(0.01, frame=name)
         scene.add_contact(pad, rod, frame="held", law=law, friction=friction, name=name)
-    x = 0.01 + radius - (force / 1e8) ** (2 / 3)
+    x = 0.01 + radius - law.depth_at(force)
     result = sp.Simulation(scene, sp.SemiImplicitEuler(2e-5)).run(
         np.array([-x, x, 0, 0, 0, 0, 0, 0, 1.0]),
         duration=2.0,
@@ -162,18 +165,16 @@ def pressing_hard_on_a_wall() -> float:
 
 @case
 def weight_of_a_ball_at_rest() -> float:
-    depth = (GRAVITY / 1e6) ** (2 / 3)
     sim = sp.Simulation(plate_scene(models.ball(radius=0.1), None), sp.SemiImplicitEuler(1e-4))
-    log = sim.run(models.free_q([0, 0, 0.1 - depth]), duration=0.5, record_dt=1e-2).contacts
+    log = sim.run(models.free_q([0, 0, 0.1 - DEPTH]), duration=0.5, record_dt=1e-2).contacts
     return float(log.normal_force[log.row == log.row[-1]].sum() / GRAVITY)
 
 
 def rolled(spin: float) -> tuple[np.ndarray, np.ndarray]:
     """Return velocity and spin in the world of a ball that slid at first, spinning about z."""
-    depth = (GRAVITY / 1e6) ** (2 / 3)
     scene = plate_scene(models.ball(radius=0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        models.free_q([-1.5, 0.2, 0.1 - depth]), [2.0, 0, 0, 0, 0, spin], 0.6, record_dt=0.01
+        models.free_q([-1.5, 0.2, 0.1 - DEPTH]), [2.0, 0, 0, 0, 0, spin], 0.6, record_dt=0.01
     )
     rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
     return rotation @ result.v[-1, :3], rotation @ result.v[-1, 3:]
@@ -182,7 +183,7 @@ def rolled(spin: float) -> tuple[np.ndarray, np.ndarray]:
 @case
 def sliding_then_rolling() -> float:
     velocity, _ = rolled(0.0)
-    lever = 1.0 - (GRAVITY / 1e6) ** (2 / 3) / 0.1
+    lever = 1.0 - DEPTH / 0.1
     return float(velocity[0] / 2.0 * (1 + 0.4 / lever**2) / 1.4)
 
 

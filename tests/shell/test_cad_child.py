@@ -24,17 +24,23 @@ from tests.shell import cad_shapes as shapes
 
 DAMAGED = sorted((Path(__file__).parents[1] / "data" / "damaged_cad").iterdir())
 
+# It holds the interpreter's lock, as OpenCASCADE does.
+HANG = "re.match('(a+)+$', 'a' * 60 + 'b')"
+MEMORY = r"takes OpenCASCADE more than the memory limit of 0\.2 GB"
 JOBS = {
-    "crash": "signal.raise_signal(signal.SIGSEGV)",
-    "abort": "os.write(2, b'free(): invalid pointer'); os.abort()",
-    "hang": "re.match('(a+)+$', 'a' * 60 + 'b')",  # with the interpreter's lock, as OpenCASCADE
-    "swell": "return [bytes(10_000_000) for k in range(10_000)]",
-    "bad_alloc": "os.write(2, b'terminate called ... std::bad_alloc'); os.abort()",
-    "raise": "raise RuntimeError('Standard_NullObject')",
-    "garbage": "os.write(answers, bytes(1000))",
-    "more garbage": "os.write(answers, b'\\xff' * 1000)",
+    "signal.raise_signal(signal.SIGSEGV)": r"box.brep: makes OpenCASCADE crash \(signal 11, "
+    r"segmentation fault\): the file",
+    "os.write(2, b'free(): invalid pointer'); os.abort()": r"crash \(signal 6, aborted; free\(\): "
+    r"invalid pointer\): the file",
+    HANG: r"takes OpenCASCADE more than the time limit of 1 s: raise time_limit",
+    "return [bytes(10_000_000) for k in range(10_000)]": MEMORY + ": raise memory_limit",
+    "os.write(2, b'terminate called ... std::bad_alloc'); os.abort()": MEMORY,
+    "raise RuntimeError('Standard_NullObject')": r"makes OpenCASCADE fail \(Standard_NullObject\): "
+    "the file is damaged",
+    "os.write(answers, bytes(1000))": "box.brep: gets no valid answer from OpenCASCADE: the file",
+    "os.write(answers, b'\\xff' * 1000)": "box.brep: gets no valid answer from OpenCASCADE",
 }
-"""What a child may do in place of reading a file."""
+"""What a child may do in place of reading a file, and what is told of it."""
 
 
 MODULE = """
@@ -60,28 +66,16 @@ def box(tmp_path):
 def load_with(job, box, monkeypatch, **limits):
     with monkeypatch.context() as patch:
         process._end_idle()
-        (box.parent / "own_child.py").write_text(MODULE.format(job=JOBS.get(job, job)))
+        (box.parent / "own_child.py").write_text(MODULE.format(job=job))
         patch.syspath_prepend(box.parent)
         patch.setattr(process, "CHILD", "own_child")
         Shell.from_file(box, "mm", **limits)
 
 
-@pytest.mark.parametrize(
-    ("job", "told"),
-    [
-        ("crash", r"box.brep: makes OpenCASCADE crash \(signal 11, segmentation fault\): the file"),
-        ("abort", r"crash \(signal 6, aborted; free\(\): invalid pointer\): the file"),
-        ("swell", r"takes OpenCASCADE more than the memory limit of 0\.2 GB: raise memory_limit"),
-        ("bad_alloc", r"takes OpenCASCADE more than the memory limit of 0\.2 GB"),
-        ("raise", r"makes OpenCASCADE fail \(Standard_NullObject\): the file is damaged"),
-        ("garbage", "box.brep: gets no valid answer from OpenCASCADE: the file is damaged"),
-        ("more garbage", "box.brep: gets no valid answer from OpenCASCADE"),
-        ("hang", r"takes OpenCASCADE more than the time limit of 1 s: raise time_limit"),
-    ],
-)
-def test_what_becomes_of_the_child_is_told_in_a_sentence(job, told, box, monkeypatch, capfd):
-    limit = 1.0 if job == "hang" else 60.0
-    with pytest.raises(ShellFileError, match=told) as caught:
+@pytest.mark.parametrize("job", JOBS)
+def test_what_becomes_of_the_child_is_told_in_a_sentence(job, box, monkeypatch, capfd):
+    limit = 1.0 if job == HANG else 60.0
+    with pytest.raises(ShellFileError, match=JOBS[job]) as caught:
         load_with(job, box, monkeypatch, memory_limit=2e8, time_limit=limit)
     assert "\n" not in str(caught.value)
     assert not process._idle  # nobody else gets that child
@@ -102,7 +96,7 @@ def test_files_on_which_opencascade_crashed_or_hung():
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_the_child_ends_with_its_parent(number, box, tmp_path):
     """A script without a guard, while the child holds the interpreter's lock for ever."""
-    (tmp_path / "own_child.py").write_text(MODULE.format(job=JOBS["hang"]))
+    (tmp_path / "own_child.py").write_text(MODULE.format(job=HANG))
     code = f"""
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)  # jobs in the background ignore it
