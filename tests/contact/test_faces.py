@@ -8,7 +8,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.shell.raw import random_places
-from tests import models
 from tests.contact.helpers import directions
 from tests.contact.smooth.test_gradient import assert_gradient
 from tests.contact.walks import jumps, paths
@@ -43,10 +42,6 @@ def spheres(shell: sp.Shell, count: int, radius: float, seed: int = 0):
     return on + radius * np.where(rng.random(count)[:, None] < 0.5, away, aside)
 
 
-def deepest(shell: sp.Shell, centers, radius: float):
-    return shell.contacts_batch(centers, np.full(len(centers), radius))[0]
-
-
 @pytest.mark.parametrize("name", ["block", "valve_body"])
 def test_contacts_are_those_of_the_trimmed_faces(name, step):
     path = step if name == "block" else VALVE_BODY
@@ -66,15 +61,6 @@ def test_beside_the_apex_of_a_cone_a_sphere_touches_once(tmp_path):
         foot = np.append(away * np.sin(slope) * turned, 30 * MM - away * np.cos(slope))
         contacts = shell.contacts(foot + 0.99 * radius * normal, radius)
         assert contacts.weight.sum() == pytest.approx(1, abs=1e-12)
-
-
-def test_chord_error_does_not_matter(step):
-    coarse, fine = (sp.Shell.from_file(step, chord_error=e) for e in (7e-4, 7e-6))
-    assert len(fine.triangles) > 5 * len(coarse.triangles)
-    for radius in (1e-3, 4e-3):
-        centers = spheres(fine, 2000, radius)
-        apart = np.abs(deepest(coarse, centers, radius) - deepest(fine, centers, radius))
-        assert apart.max() <= 1e-10 * radius
 
 
 def test_faces_of_a_file(step):
@@ -216,23 +202,6 @@ def test_saddles_are_where_three_faces_meet(tmp_path):
     assert found.weight.tolist() == [1, 1, 1, -1, -1]
     distances = [0.8, beside, 4.9, np.hypot(beside, 0.8), np.hypot(4.9, 0.8)]
     assert found.depth == pytest.approx((5.5 - np.array(distances)) * MM, rel=1e-9)
-
-
-@pytest.mark.parametrize("friction", [None, sp.CoulombFriction()])
-def test_a_ball_that_falls_into_a_seat_rests_on_its_axis(friction, step):
-    radius, shell = 6.0 * MM, sp.Shell.from_file(step)
-    law = sp.ImpactLaw(1e6, exponent=1.5, damping=50.0, full_damping_depth=1e-5)
-    scene = models.on_shell(models.block(9.81, 0.05, radius), shell, law, friction, radius=radius)
-    half_angle = np.arctan(0.6)
-    touching = 10.0 * MM + radius / np.sin(half_angle) - 2.0 * MM / np.tan(half_angle)
-    start = np.array([35 * MM, 20 * MM, touching + 2 * MM])
-    result = sp.Simulation(scene, sp.Adaptive()).run(start, np.zeros(3), 0.3)
-    depth = (0.05 * 9.81 / np.sin(half_angle) / 1e6) ** (1 / 1.5)
-    assert np.array_equal(result.q[-1][:2], start[:2])
-    log = result.contacts
-    assert log.feature[-1] == sp.Feature.RING
-    assert np.isclose(log.normal_force[-1] * np.sin(half_angle), 0.05 * 9.81, rtol=0.05)
-    assert np.isclose(touching - result.q[-1][2], depth / np.sin(half_angle), rtol=0.05)
 
 
 @pytest.mark.parametrize("single", [False, True])

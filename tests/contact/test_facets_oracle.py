@@ -91,17 +91,6 @@ def test_closest_points(name: str) -> None:
         assert abs(np.linalg.norm(closest.normals[k]) - 1.0) <= 1e-14
 
 
-def test_crease_angle_does_not_matter_to_the_exact_polyhedron() -> None:
-    mesh = meshes.crumpled(5, seed=3)
-    reference = shell_of(mesh)
-    for angle in (0.0, 0.2, np.pi):
-        shell = shell_of(mesh, crease_angle=angle)
-        for center in positions(*mesh, 0.3, 40, seed=5):
-            a, b = (s.contacts(center, 0.3, method="facets") for s in (reference, shell))
-            assert np.array_equal(a.point, b.point)
-            assert np.array_equal(a.depth, b.depth)
-
-
 @pytest.mark.parametrize("height", [1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7])
 def test_nearly_flat_is_not_flat(height: float) -> None:
     """Coplanar to rounding is one plane, but a real bump, however low, is met to 1e-12."""

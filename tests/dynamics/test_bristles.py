@@ -87,19 +87,6 @@ def test_borders_of_elements_are_not_felt(method: str) -> None:
     assert len(np.unique(ends[1].contacts.element)) > 5
 
 
-def test_lift_off_forgets() -> None:
-    """At every touch the bristle begins unstretched, whatever it held when it left."""
-    law, friction = models.linear_law(1e4, 3.0), sp.BristleFriction(0.5, 0.5, 1e4)
-    scene = models.on_shell(models.ball(), models.square(4.0), law, friction)
-    v = [1.0, 0.3, -1.0, 5.0, 8.0, 1.0]
-    rows = run(scene, ACCURATE, models.free_q([0, 0, R + 0.01]), v, 1.2)
-    numbers, first = np.unique(rows.contacts.contact_id, return_index=True)
-    touches = [e.t for e in rows.events if e.kind == "touch"]
-    assert len(numbers) == len(touches) > 3
-    assert rows.contacts.t[first] == pytest.approx(touches, abs=1e-12)
-    assert np.abs(rows.contacts.friction_force_world[first]).max() < 1e-6
-
-
 DEEP = 1e-3
 
 

@@ -11,6 +11,7 @@ from tests import meshes, models
 R = 0.006
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 BRISTLE = sp.BristleFriction(0.6, 0.5, 1e5, 30.0)
+RINGS = sp.MindlinFriction(0.3, 0.3, 1e7, 0.4, rings=4, torsional=True)
 
 
 def pad(count: int = 8, lift: float = 0.0005) -> list[sp.Sphere]:
@@ -72,13 +73,15 @@ def test_no_contact_is_missed_at_the_border_of_the_shell(method: str) -> None:
 INTEGRATORS = [sp.SemiImplicitEuler(1e-4), sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)]
 
 
+@pytest.mark.parametrize("friction", [BRISTLE, RINGS], ids=["bristle", "rings"])
 @pytest.mark.parametrize("integrator", INTEGRATORS, ids=lambda one: type(one).__name__)
-def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[no-untyped-def]
+def test_together_they_move_as_one_by_one(integrator, friction) -> None:  # type: ignore[no-untyped-def]
     # Falls, hits, tumbles.
     q, v = models.free_q([0.0, 0.0, 0.012]), np.array([0.3, 0.1, -0.5, 1.0, -2.0, 5.0])
     exact, ends = isinstance(integrator, sp.SemiImplicitEuler), []
     for together in (True, False):
-        result = models.run(scene_of(pad(3), together=together), integrator, q, v, 0.05)
+        scene = scene_of(pad(3), together=together, friction=friction)
+        result = models.run(scene, integrator, q, v, 0.05)
         assert sum(figures.touches for figures in result.stats.pairs.values()) > 3
         if not exact:
             testing.assert_energy_kept(result, 1e-5)

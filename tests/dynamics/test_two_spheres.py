@@ -115,26 +115,6 @@ def test_no_sphere_flies_through_another(integrator, speed: float) -> None:  # t
     assert {event.kind for event in result.events} == {"touch", "lift_off"}
 
 
-@pytest.mark.parametrize("friction", ["none", "coulomb"])
-def test_a_ball_agrees_with_its_fine_mesh(friction: str) -> None:
-    ball = pin.GeometryObject("ball", 0, pin.SE3.Identity(), coal.Sphere(OTHER))
-    shell = sp.Shell.from_geometry(ball, chord_error=1e-3 * OTHER)
-    meshed = sp.Scene(two_bodies())
-    law = LAWS["hunt-crossley"]
-    placement = pin.SE3(np.eye(3), np.array(TWO.offset))
-    meshed.add_contact(ONE, shell, "two", placement, law=law, friction=FRICTIONS[friction])
-    closed = two_spheres(law, FRICTIONS[friction])
-    for seed in range(5):
-        q, v = in_touch(10 + seed)
-        got, expected = closed.contacts(q, v), meshed.contacts(q, v)
-        assert len(got) == len(expected) == 1
-        assert np.allclose(got.depth, expected.depth, rtol=0, atol=1e-9)
-        assert np.allclose(got.point_world, expected.point_world, rtol=0, atol=1e-6)
-        for a, b in zip(closed.external_forces(q, v), meshed.external_forces(q, v), strict=True):
-            size = np.abs(b.vector).max()
-            assert np.allclose(a.vector, b.vector, rtol=0, atol=1e-4 * size)
-
-
 def test_a_deep_start_is_refused_by_the_smaller_radius() -> None:
     scene = two_spheres(sp.ImpactLaw(1e4, 1.5))
     q, v = in_touch(6, depth=0.6 * R)
