@@ -186,8 +186,6 @@ def test_an_untouched_model_is_one_object_and_equal_to_the_given_one() -> None:
     [
         *((damage, "joint") for damage in DEADLY.values()),
         (lambda model: model.joints[1].setIndexes(1, 40, 40), "indices of joint"),
-        (lambda model: model.joints[1].setIndexes(9, 0, 0), "indices of joint"),
-        (lambda model: model.joints[1].setIndexes(1, -1, 0), "indices of joint"),
         (lambda model: model.nqs.__setitem__(1, 3), "indices of joint"),
         (lambda model: model.idx_vs.__setitem__(1, 40), "lists of indices"),
         (lambda model: model.subtrees[1].append(40), "supports or subtrees"),

@@ -182,9 +182,7 @@ def _with(result: sp.Result, part: str, **values: object) -> sp.Result:
     [
         (lambda r: replace(r, q=r.q.astype("f4")), "'q' holds float32, not float64"),
         (lambda r: replace(r, q=r.q[1:]), r"'q' has the shape .* with n = "),
-        (lambda r: replace(r, v=r.v[0]), r"'v' has the shape"),
         (lambda r: replace(r, t=r.t[::-1].copy()), "'t' does not rise at row 0"),
-        (lambda r: replace(r, t=np.full_like(r.t, np.nan)), "'t' does not rise"),
         (lambda r: replace(r, q=np.ma.masked_less(r.q, 0.0)), "'q' is a masked array"),
         (lambda r: replace(r, pairs=("a", "a")), "header.pairs does not list each pair once"),
         (lambda r: replace(r, events=(Event("0", r.pairs[0], "stick"),)), "header.events"),
@@ -283,10 +281,8 @@ class _Enough(Exception):
     ("integrator", "record_dt", "rows"),
     [
         (sp.SemiImplicitEuler(1e-5), None, "1.5e+06 rows"),
-        (sp.SemiImplicitEuler(1e-5), 1e-7, "1.5e+06 rows"),
         (sp.Adaptive(), 1e-6, "1.5e+07 rows"),
         (sp.SemiImplicitEuler(1e-5), 1e-3, ""),
-        (sp.SemiImplicitEuler(2e-5), None, ""),
         (sp.Adaptive(), None, ""),
     ],
 )
