@@ -30,17 +30,6 @@ def panda() -> tuple[pin.Model, pin.Model]:
     return tuple(pin.buildModelFromUrdf(path, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
 
 
-def reduction(model: pin.Model, full: pin.Model) -> tuple[Array, Array]:
-    """Return G (nv of full, nv) and the offsets of q = G q_reduced + offset."""
-    matrix, offset = np.zeros((full.nv, model.nv)), np.zeros(full.nq)
-    for joint, free in zip(model.joints[1:], full.joints[1:], strict=True):
-        ratio = 1.0
-        if joint.shortname() == "JointModelMimic":
-            ratio, offset[free.idx_q] = joint.extract().scaling, joint.extract().offset
-        matrix[free.idx_v, joint.idx_v] = ratio
-    return matrix, offset
-
-
 def with_contact(model: pin.Model, tip: str, other: str) -> sp.Scene:
     """A sphere on one finger against a shell on the other, which always touch."""
     scene = sp.Scene(model)
@@ -76,8 +65,7 @@ def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:
 @pytest.mark.parametrize("off", [1e-5, -1e-3, 0.1])
 def test_a_joint_that_follows_is_where_its_rule_puts_it(off: float) -> None:
     model, full = gripper()
-    matrix, offset = reduction(model, full)
-    q = matrix @ np.array([0.1, 0.4]) + offset
+    q = Tree(full, model).expanded(np.array([0.1, 0.4]), np.zeros(2))[0]
     np.testing.assert_allclose(shortened(model, q, check=True), [0.1, 0.4], rtol=0, atol=0)
     for joint in mimics(model):
         one = q.copy()

@@ -70,7 +70,6 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
     mixed.addJoint(pin.JointModelRUBZ(), pin.SE3.Identity())
     parts = {
         "flyer": (pin.JointModelFreeFlyer(), slice(3, 7)),
-        "hinge": (pin.JointModelRX(), slice(0, 0)),
         "sled": (pin.JointModelPlanar(), slice(2, 4)),
         "mixed": (mixed, slice(1, 3)),
         "wheel": (pin.JointModelRUBX(), slice(0, 2)),
@@ -79,16 +78,13 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
     model, parent = models.empty(), 0
     for name, (joint, _) in parts.items():
         parent = models.add_body(model, name, joint, parent)
-    scene = sp.Scene(model)
     for (name, (_, part)), scale in product(parts.items(), (0.0, 0.9, 2.0)):
-        first = model.joints[model.getJointId(f"{name}_joint")].idx_q
-        q = pin.neutral(model)
+        q, first = pin.neutral(model), model.joints[model.getJointId(f"{name}_joint")].idx_q
         q[first + part.start : first + part.stop] *= scale
-        if part.stop:
-            with pytest.raises(errors.InvalidParameter, match=f"'{name}_joint'.*unit") as caught:
-                scene.check_state(q)
-            assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
-            assert len(caught.value.value) == part.stop - part.start
+        with pytest.raises(errors.InvalidParameter, match=f"'{name}_joint'.*unit") as caught:
+            sp.Scene(model).check_state(q)
+        assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
+        assert len(caught.value.value) == part.stop - part.start
 
 
 def test_deep_start() -> None:
@@ -97,16 +93,6 @@ def test_deep_start() -> None:
     assert caught.value.pair == "ball-plate"
     assert caught.value.depth == pytest.approx(0.6 * RADIUS)
     assert caught.value.radius == RADIUS
-
-
-def test_a_failed_run_leaves_the_simulation_usable() -> None:
-    sim = bouncing()
-    before = sim.run(*START, 0.05)
-    with pytest.raises(errors.InvalidParameter):
-        sim.run(np.zeros(3), np.zeros(6), 0.1)
-    with pytest.raises(errors.DeepStart):
-        sim.run(models.free_q([0, 0, 0.01]), np.zeros(6), 0.1)
-    assert np.array_equal(sim.run(*START, 0.05).q, before.q)
 
 
 def test_a_python_controller_sees_contacts() -> None:
@@ -234,16 +220,15 @@ def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
     """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
     arm, plate = robots.load("panda"), models.plate()
     scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
-    frames = ("panda_link3", "panda_link5", "panda_link7", "panda_hand")
-    for (k, frame), method in product(enumerate(frames), ("smooth", "facets")):
-        ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
+    spheres = [sp.Sphere(0.02, f"panda_{name}") for name in ("link3", "link5", "link7", "hand")]
+    for k, method in product(range(4), ("smooth", "facets")):
         friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
         more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
-        scene.add_contact(ball, plate, placement=where, **more)
-    scene.add_contact(sp.Sphere(0.02, frames[0]), plate, frame=frames[2], law=LAW, name="moving")
-    scene.add_contact(sp.Sphere(0.02, frames[3]), sp.Sphere(0.03, frames[1]), law=LAW, name="two")
-    scene.add_contact(sp.Plane("universe"), plate, frame=frames[3], law=LAW, name="plane")
-    scene.add_contact_source(nowhere, frames[0], frames[1], law=LAW, name="own")
+        scene.add_contact(spheres[k], plate, placement=where, **more)
+    scene.add_contact(spheres[0], plate, frame="panda_link7", law=LAW, name="moving")
+    scene.add_contact(spheres[3], spheres[1], law=LAW, name="two")
+    scene.add_contact(sp.Plane("universe"), plate, frame="panda_hand", law=LAW, name="plane")
+    scene.add_contact_source(nowhere, "panda_hand", "panda_link5", law=LAW, name="own")
     return scene, np.asarray(arm.q0)
 
 

@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from tests import models, urdf
 from tests.texts import DATA, text_of
@@ -221,21 +220,6 @@ def test_what_a_joint_adds_is_transmitted():
     assert result.stats.joints[joint].cut_time > 0.19
 
 
-def test_joints_that_mimic_others():
-    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
-    model = robots.load("panda", mimic=True).model
-    finger = model.names[model.njoints - 1]
-    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
-    force = rest(sp.Scene(model), q, sensor("panda_hand"))[:3]
-    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
-    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
-    turn = models.pose_of(model, q, "panda_hand").rotation
-    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
-    follower = sp.JointTorqueSensor(name="s", joint=finger)
-    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
-        read(sp.Scene(model), q, None, [follower])
-
-
 def test_the_drive_of_joints_that_follow_carries_them():
     """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
     model = pin.buildModelFromXML(text_of("robots/two_slides.urdf"), mimic=True)
@@ -244,6 +228,9 @@ def test_the_drive_of_joints_that_follow_carries_them():
     result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
     assert abs(result.sensors["drive"].values[0, 0] - 9.81 * (1.0 + 2 * 0.5)) < 1e-12
     assert abs(result.sensors["wrench"].values[0, 2] - 9.81 * 0.5) < 1e-12
+    follower = sp.JointTorqueSensor(name="s", joint="second")
+    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
+        read(sp.Scene(model), [0.1], None, [follower])
     # Let go, the first falls with g (1 + 1) / (1 + 4 0.5): the drive gives nothing.
     fall = read(sp.Scene(model), [0.1], None, [drive, wrench])
     assert abs(fall.sensors["drive"].values[0, 0]) < 1e-12
