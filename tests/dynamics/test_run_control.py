@@ -7,7 +7,7 @@ import sys
 import threading
 import warnings
 from contextlib import suppress
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -16,10 +16,9 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import errors, robots
+from sphshell_pin import errors
 from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
 from sphshell_pin.dynamics.run import advance
-from sphshell_pin.dynamics.scene.explain import explain_pairs
 from tests import models
 from tests.results import assert_same_bits
 from tests.texts import DATA
@@ -214,37 +213,6 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
 
 
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
-
-
-def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
-    """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
-    arm, plate = robots.load("panda"), models.plate()
-    scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
-    spheres = [sp.Sphere(0.02, f"panda_{name}") for name in ("link3", "link5", "link7", "hand")]
-    for k, method in product(range(4), ("smooth", "facets")):
-        friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
-        more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
-        scene.add_contact(spheres[k], plate, placement=where, **more)
-    scene.add_contact(spheres[0], plate, frame="panda_link7", law=LAW, name="moving")
-    scene.add_contact(spheres[3], spheres[1], law=LAW, name="two")
-    scene.add_contact(sp.Plane("universe"), plate, frame="panda_hand", law=LAW, name="plane")
-    scene.add_contact_source(nowhere, "panda_hand", "panda_link5", law=LAW, name="own")
-    return scene, np.asarray(arm.q0)
-
-
-def nowhere(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
-
-
-def test_the_figures_of_pairs_do_not_depend_on_the_other_pairs() -> None:
-    scene, q = of_all_kinds()
-    rng = np.random.default_rng(1)
-    for _ in range(5):
-        state = scene.check_state(q + rng.normal(scale=0.2, size=q.size), rng.normal(size=q.size))
-        together = explain_pairs(scene, *state)
-        for pair, figures in zip(scene.pairs, together, strict=True):
-            (alone,) = explain_pairs(scene.with_pairs((pair,)), *state)
-            np.testing.assert_equal(astuple(figures), astuple(alone))
 
 
 def test_what_is_kept_of_a_pair_goes_with_it() -> None:
