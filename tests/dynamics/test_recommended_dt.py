@@ -328,6 +328,13 @@ def test_joints_have_scales_of_their_own() -> None:
         assert both == pytest.approx(min(ring, impact), rel=1e-12)
 
 
+@pytest.mark.parametrize(("share", "weak"), [(1 - 1e-9, False), (1 + 1e-9, True)])
+def test_a_law_is_weak_whose_depth_would_reach_the_radius(share: float, weak: bool) -> None:
+    speed = share * RADIUS * math.sqrt(1e5 / MASS)
+    told = falling(ELASTIC["linear"]).explain([RADIUS], [-speed]).warnings
+    assert any("the law cannot stop the sphere" in one for one in told) == weak
+
+
 @pytest.mark.parametrize(("share", "soft"), [(0.08, False), (0.15, True), (0.3, True)])
 def test_a_law_in_which_a_body_sinks_by_a_tenth_of_its_radius_is_soft(share, soft) -> None:
     scene = falling(models.linear_law(MASS * 9.81 / (share * RADIUS), 10.0), gravity=9.81)

@@ -54,6 +54,7 @@ def put(old: str, new: str):
         ("sensitivities.force_world", lambda a: a[..., 0], "not \\(m, 3, p\\)"),
         ("sensitivities.normal_force", lambda a: None, "no array 'sensitivities.normal_force'"),
         ("sensitivities.q", lambda a: a.astype("f4"), r"'sensitivities\.q' holds float32"),
+        ("sensitivities.q", lambda a: a.astype(object), "Python objects"),
         ("header", put("tip.law.stiffness", "v0.0"), "does not name each of 7 columns once"),
         ("header", put('"tip.law.stiffness"', "3"), r"header\.sensitivities\.0: "),
     ],
