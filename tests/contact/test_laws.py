@@ -55,14 +55,6 @@ def test_the_documented_example() -> None:
     assert law.normal_force(0.5, -20.0) == pytest.approx(93.5275281648, abs=1e-10)
 
 
-def test_adams_units() -> None:
-    """K [N/m^e] = K [N/mm^e] 1000^e; damping by 1000; depth by 1e-3."""
-    assert DEFAULTS.stiffness == pytest.approx(1e5 * 1000.0**2.2, rel=1e-14)
-    assert DEFAULTS.exponent == 2.2
-    assert DEFAULTS.damping == pytest.approx(1e4, rel=1e-15)
-    assert DEFAULTS.full_damping_depth == pytest.approx(1e-4, rel=1e-15)
-
-
 @settings(derandomize=True, deadline=None)
 @given(
     depth=st.floats(-1e-3, 1e-3),

@@ -72,41 +72,23 @@ def test_a_bristle_that_slides_stores_what_it_holds(speed: float) -> None:
     assert stored[5:] == pytest.approx(0.5 * (0.3 * G) ** 2 / K, rel=1e-6)
 
 
-DEEP = 1e-3
-
-
-def drill(*joints: pin.JointModel) -> sp.Scene:
-    """A ball held at a depth of 1 mm, on `joints`."""
-    model = models.empty(0.0)
-    place = pin.SE3(np.eye(3), np.array([0.0, 0.0, R - DEEP]))
-    light = pin.Inertia(1e-9, np.zeros(3), 1e-12 * np.eye(3))
-    parent = 0
-    for i, joint in enumerate(joints[:-1]):
-        parent = models.add_body(model, f"b{i}", joint, parent, placement=place, inertia=light)
-        place = pin.SE3.Identity()
-    lump = pin.Inertia.FromSphere(1.0, R)
-    models.add_body(model, "ball", joints[-1], parent, placement=place, inertia=lump)
-    friction = sp.BristleFriction(0.4, 0.4, 1e6, 0.0, torsional=True)
-    return models.on_shell(model, models.square(4.0), models.linear_law(1e4), friction)
-
-
-INERTIA = 0.4 * R**2
-LOAD = 1e4 * DEEP
-LEVER = 3 * np.pi / 16 * np.sqrt(R * DEEP)
-
-
 def test_force_and_moment_share_the_limit() -> None:
     """Both act against w = v + rho spin n, with mu N together: while sliding they keep its way."""
-    scene = drill(pin.JointModelPX(), pin.JointModelRZ())
+    depth, model = 1e-3, models.empty(0.0)
+    place, light = pin.SE3(np.eye(3), np.array([0, 0, R - depth])), pin.Inertia.FromSphere(1e-9, R)
+    carrier = models.add_body(model, "carrier", pin.JointModelPX(), placement=place, inertia=light)
+    ball = pin.Inertia.FromSphere(1.0, R)
+    models.add_body(model, "ball", pin.JointModelRZ(), carrier, inertia=ball)
+    friction = sp.BristleFriction(0.4, 0.4, 1e6, 0.0, torsional=True)
+    scene = models.on_shell(model, models.square(4.0), models.linear_law(1e4), friction)
     rows = run(scene, sp.Adaptive(1e-9), [0.0, 0.0], [0.5, 30.0], 0.02, record_dt=1e-4)
     force = np.diff(rows.v[:, 0]) / np.diff(rows.t)
-    moment = np.diff(rows.v[:, 1]) / np.diff(rows.t) * INERTIA
-    limit = 0.4 * LOAD
-    late = slice(20, 100)
-    whole = (force / limit) ** 2 + (moment / (limit * LEVER)) ** 2
+    moment = np.diff(rows.v[:, 1]) / np.diff(rows.t) * ball.inertia[2, 2]
+    limit, lever, late = 0.4 * 1e4 * depth, 3 * np.pi / 16 * np.sqrt(R * depth), slice(20, 100)
+    whole = (force / limit) ** 2 + (moment / (limit * lever)) ** 2
     assert whole[late] == pytest.approx(1.0, rel=2e-3)
     v = 0.5 * (rows.v[1:] + rows.v[:-1])
-    assert (moment / force)[late] == pytest.approx((LEVER**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
+    assert (moment / force)[late] == pytest.approx((lever**2 * v[:, 1] / v[:, 0])[late], rel=1e-2)
 
 
 MASS, SPRING, DRAWN, STATIC, DYNAMIC, RADIUS = 1.0, 1e3, 0.01, 0.6, 0.4, 0.02

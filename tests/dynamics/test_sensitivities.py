@@ -179,16 +179,6 @@ def test_the_run_has_the_same_bits() -> None:
         assert other.sensitivities.q.tobytes() == again.sensitivities.q.tobytes()
 
 
-def test_a_column_does_not_depend_on_the_others() -> None:
-    case = thrown(IMPACT, sensitivities.BRISTLE, duration=0.04)
-    alone = case.run(names=["ball.law.stiffness"]).sensitivities
-    among = case.run(names=["v0", "ball.law.stiffness", "ball.placement"]).sensitivities
-    at = list(among.parameters).index("ball.law.stiffness")
-    for name in ("q", "v", "depth", "force_world"):
-        one, other = getattr(alone, name)[..., 0], getattr(among, name)[..., at]
-        np.testing.assert_allclose(other, one, rtol=0, atol=1e-5 * np.abs(one).max())
-
-
 def test_a_controller_with_a_memory_is_refused() -> None:
     asked = []
 

@@ -76,20 +76,16 @@ def test_torsion_is_symmetric_and_that_of_the_disc_of_both_radii() -> None:
         assert np.isclose(moment, -limit, rtol=1e-12)
 
 
-def spinning_impact(friction, integrator) -> sp.Result:  # type: ignore[no-untyped-def]
-    """Two free balls that hit each other off center, spinning."""
-    scene = sp.Scene(two_bodies(pin.Inertia.FromSphere(1.0, R)))
-    law = sp.HuntCrossleyLaw(1e7, 1.5, 0.1)
-    scene.add_contact(sp.Sphere(R, "one"), sp.Sphere(OTHER, "two"), law=law, friction=friction)
-    q = np.concatenate([models.free_q([0.0, 0.04, 0.01]), models.free_q([0.14, 0.0, 0.0])])
-    v = np.array([2.0, 0, 0, 10, 20, -30, -1.0, 0, 0.5, 5, -10, 20])
-    return models.run(scene, integrator, q, v, 0.02)
-
-
 @pytest.mark.parametrize("friction", FRICTIONS)
 @pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-8, 1e-10)])
 def test_an_oblique_impact_keeps_momentum_and_the_energy_audit(friction: str, integrator) -> None:  # type: ignore[no-untyped-def]
-    result = spinning_impact(FRICTIONS[friction], integrator)
+    """Of two free balls that hit each other off center, spinning."""
+    scene = sp.Scene(two_bodies(pin.Inertia.FromSphere(1.0, R)))
+    more = {"law": sp.HuntCrossleyLaw(1e7, 1.5, 0.1), "friction": FRICTIONS[friction]}
+    scene.add_contact(sp.Sphere(R, "one"), sp.Sphere(OTHER, "two"), **more)
+    q = np.concatenate([models.free_q([0.0, 0.04, 0.01]), models.free_q([0.14, 0.0, 0.0])])
+    v = np.array([2.0, 0, 0, 10, 20, -30, -1.0, 0, 0.5, 5, -10, 20])
+    result = models.run(scene, integrator, q, v, 0.02)
     (figures,) = result.stats.pairs.values()
     assert figures.touches == 1
     assert result.energy.damping_loss[-1] > 0
