@@ -227,6 +227,20 @@ def test_touch_times_against_the_closed_form(kind, rtol: float) -> None:
     assert times == pytest.approx(exact, abs=20 * rtol)
 
 
+@either
+@pytest.mark.parametrize("law", LAWS)
+def test_a_step_ends_at_each_event(kind, law: str) -> None:
+    """A contact begins with hardly any depth, and the row before its end has hardly any."""
+    result = bounce(kind(1e-6), LAWS[law])
+    depth = np.zeros(len(result.t))
+    depth[result.contacts.row] = result.contacts.depth
+    for event in result.events:
+        row = int(np.searchsorted(result.t, event.t))
+        assert result.t[row] == event.t
+        near = row if event.kind == "touch" else row - 1
+        assert 0 <= depth[row] < 1e-10 if near == row else depth[row] == 0
+
+
 def test_the_first_of_several_events_ends_the_step() -> None:
     """Two spheres of one body over a plate touch one after the other."""
     model = models.slider()
