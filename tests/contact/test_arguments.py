@@ -101,6 +101,7 @@ REFUSED: list[tuple[str, Call]] = [
     # Planes
     *(("must be 'smooth'", lambda m=m: scene_of(CUBE, method=m)) for m in ("facets", "elements")),
     ("must be a Shell", lambda: scene_of(sp.Sphere(0.1, "body"))),
+    (r"take law.on_plane\(radius\), or", lambda: scene_of(egg(), sp.HertzLaw(1e9, 0.3))),
     ("follows from the radius", lambda: scene_of(egg(), friction=SPINS)),
     ("must not be zero", lambda: sp.Plane("universe", normal=(0.0, 0.0, 0.0))),
     # Friction

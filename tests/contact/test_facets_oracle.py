@@ -14,24 +14,20 @@ EPS = float(np.finfo(float).eps)
 
 # name -> (mesh, radii to try)
 SURFACES = {
-    "two triangles": (meshes.grid_plate(), (0.2, 1.5)),
     "quads": (meshes.grid_plate(3, 3, quads=True), (0.2, 1.5)),
     "random plate": (meshes.random_plate(60, seed=1), (0.1, 0.4)),
     "l plate": (meshes.l_plate(2), (0.2, 0.8)),
     "v groove": (meshes.v_groove(0.5, cells=2), (0.2, 1.2)),
-    "sharp v groove": (meshes.v_groove(1.3), (0.3, 1.0)),
     "flat v groove": (meshes.v_groove(1e-3, cells=2), (0.3, 1.0)),
     "ridge": (meshes.v_groove(-0.5, cells=2), (0.2, 1.2)),
     "cube": (meshes.cube(), (0.3, 1.2)),
     "cube of quads": (meshes.cube(quads=True), (0.3, 1.2)),
     "icosahedron": (meshes.icosphere(0), (0.4, 1.2)),
     "icosphere": (meshes.icosphere(2), (0.2, 0.95)),
-    "dome": (meshes.dome(6), (0.3,)),
     "bowl": (meshes.bowl(6), (0.3, 1.5)),
     "crumpled": (meshes.crumpled(5, seed=2), (0.15, 0.5)),
     "needles": (meshes.needles(24, 1e4), (0.05, 0.6)),
     "fan": (meshes.fan(5, seed=1), (0.2, 0.6)),
-    "wide fan": (meshes.fan(9, seed=4), (0.4,)),
     "soup": (meshes.soup(40, seed=0), (0.2, 0.5)),
     "sparse soup": (meshes.soup(12, seed=5, spread=0.3), (0.4, 1.5)),
     "dense soup": (meshes.soup(120, seed=7, spread=0.2), (0.15,)),
@@ -89,17 +85,6 @@ def test_closest_points(name: str) -> None:
         assert abs(abs(closest.distances[k]) - distance) <= 1e-12
         assert abs(np.linalg.norm(point - closest.points[k]) - distance) <= 1e-12
         assert abs(np.linalg.norm(closest.normals[k]) - 1.0) <= 1e-14
-
-
-def test_crease_angle_does_not_matter_to_the_exact_polyhedron() -> None:
-    mesh = meshes.crumpled(5, seed=3)
-    reference = shell_of(mesh)
-    for angle in (0.0, 0.2, np.pi):
-        shell = shell_of(mesh, crease_angle=angle)
-        for center in positions(*mesh, 0.3, 40, seed=5):
-            a, b = (s.contacts(center, 0.3, method="facets") for s in (reference, shell))
-            assert np.array_equal(a.point, b.point)
-            assert np.array_equal(a.depth, b.depth)
 
 
 @pytest.mark.parametrize("height", [1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7])

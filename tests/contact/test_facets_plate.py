@@ -31,7 +31,6 @@ def spots(vertices, triangles, seed):
 @pytest.mark.parametrize("kind", ["slivers", "delaunay"])
 def test_one_exact_contact(kind: str, how: str, count: int) -> None:
     if kind == "delaunay":
-        pytest.importorskip("scipy")
         vertices, triangles = meshes.delaunay_plate(count, seed=count)
     else:
         vertices, triangles = meshes.random_plate(count, seed=count)

@@ -17,7 +17,7 @@ from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.testing import assert_derivatives
 from tests import models
-from tests.contact.test_table_law import LAW_LINE, SPRING, TABLE
+from tests.contact.test_table_law import LAW_LINE
 from tests.scenario.files import DROP, write
 
 FORCE = ctypes.CFUNCTYPE(
@@ -121,54 +121,27 @@ def test_the_energy_is_the_integral_over_kinks(name) -> None:
             assert np.isclose(law.energy(depth), expected(depth), rtol=1e-9, atol=1e-20)
 
 
-# Law and friction of one's own, those of the twin, numbers of both, what derivatives differ by.
-LAWS = (["law.k", "law.b"], ["law.stiffness", "law.dissipation"], 1e-8)
 BRISTLES = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
 TWINS = [
-    ((C_LAW, models.FRICTION), (TWIN, models.FRICTION), MOVES, *LAWS),
-    ((C_LAW, BRISTLES), (TWIN, BRISTLES), MOVES, *LAWS),
-    *(
-        ((law, OWN), (law, SMOOTH), moves, [], [], 1e-7)
-        for law in (TWIN, C_LAW)
-        for moves in (SLOW, MOVES, 0 * MOVES)
-    ),
+    *(((C_LAW, slip), (TWIN, slip), MOVES) for slip in (models.FRICTION, BRISTLES)),
+    *(((C_LAW, OWN), (TWIN, SMOOTH), moves) for moves in (SLOW, MOVES, 0 * MOVES)),
 ]
 
 
-@pytest.mark.parametrize(("own", "twin", "moves", "ours", "theirs", "error"), TWINS)
-def test_derivatives_are_those_of_the_twin(own, twin, moves, ours, theirs, error) -> None:
+@pytest.mark.parametrize(("own", "twin", "moves"), TWINS)
+def test_derivatives_are_those_of_the_twin(own, twin, moves) -> None:
     scenes = [models.on_plate(models.ball(), *one) for one in (own, twin)]
     if moves.any():
         assert_derivatives(scenes[0], BALL, moves)
     found, exact = (
         scene.dynamics_derivatives(
-            BALL, moves, np.zeros(6), parameters=[f"ball-plate.{name}" for name in names]
+            BALL, moves, np.zeros(6), parameters=[f"ball-plate.law.{name}" for name in names]
         )
-        for scene, names in zip(scenes, (ours, theirs), strict=True)
+        for scene, names in zip(scenes, (["k", "b"], ["stiffness", "dissipation"]), strict=True)
     )
-    for name in ("by_q", "by_v", *(["by_parameters"] if ours else [])):
+    for name in ("by_q", "by_v", "by_parameters"):
         a, b = getattr(found, name), getattr(exact, name)
-        np.testing.assert_allclose(a, b, rtol=0, atol=error * np.abs(b).max())
-
-
-@pytest.mark.parametrize(
-    ("own", "twin", "error"),
-    [
-        ((C_LAW, None), (TWIN, None), 1e-9),
-        ((TABLE, None), (SPRING, None), 1e-6),
-        ((TWIN, OWN), (TWIN, SMOOTH), 1e-8),
-    ],
-)
-def test_a_run_is_that_of_the_twin_and_keeps_its_energy(own, twin, error) -> None:
-    ours, theirs = (
-        sp.Simulation(models.on_plate(models.ball(), *one), sp.Adaptive(1e-10)).run(
-            BALL, MOVES, 0.2, record_dt=1e-3
-        )
-        for one in (own, twin)
-    )
-    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=error)
-    assert np.abs(ours.energy.residual).max() < 1e-8
-    assert (ours.energy.friction_loss[-1] > 1e-4) == (own[1] is not None)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max())
 
 
 @pytest.mark.parametrize("make", [lambda: C_LAW, python_law], ids=["C", "python"])

@@ -74,10 +74,6 @@ def some_turned_over(vertices, elements, normals):
     return vertices, np.where(flip, elements[:, ::-1], elements).astype(np.int32), normals
 
 
-def all_turned_over(vertices, elements, normals):
-    return vertices, elements[:, ::-1].copy(), normals
-
-
 def duplicated(vertices, elements, normals):
     again = elements[::2] + len(vertices)
     joined = np.concatenate([elements, again, elements[::3]])
@@ -94,7 +90,7 @@ def normals_at_corners(vertices, elements, normals):
     return vertices, elements, of(normals, lambda n: n[elements])
 
 
-CHANGES = [shuffled, some_turned_over, all_turned_over, duplicated, unwelded, normals_at_corners]
+CHANGES = [shuffled, some_turned_over, duplicated, unwelded, normals_at_corners]
 
 
 @pytest.mark.parametrize("change", CHANGES)
@@ -158,15 +154,3 @@ def test_other_diagonals_and_quads() -> None:
         sets = [s.contacts(center, RADIUS, method="facets") for s in shells]
         for other_set in sets[1:]:
             assert difference(sets[0], other_set, RADIUS) <= 1e-12, center.tolist()
-
-
-def test_t_junctions() -> None:
-    """A side met by two halves is the same edge: nothing extra over it, nothing missing."""
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0.0]])
-    whole = np.array([[0, 1, 2], [0, 2, 3]])
-    split = np.array([[0, 1, 2], [0, 4, 3], [4, 2, 3]])
-    a, b = shell_of((vertices[:4], whole)), shell_of((vertices, split))
-    for x, y in np.random.default_rng(0).uniform(-0.05, 1.05, (400, 2)):
-        for center in ([x, y, 0.19], [x, x, 0.19]):
-            first, second = (s.contacts(center, 0.2, method="facets") for s in (a, b))
-            assert difference(first, second, 0.2) <= 1e-12, center

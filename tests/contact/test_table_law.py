@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 import sphshell_pin as sp
 from sphshell_pin.errors import ScenarioError
 from sphshell_pin.scenario import build
-from sphshell_pin.testing import assert_derivatives
 from tests import models
 from tests.scenario.files import DROP, write
 
@@ -79,21 +78,10 @@ def test_it_reproduces_the_spring_that_it_was_taken_from() -> None:
         assert question(TABLE) == pytest.approx(question(SPRING), rel=1e-5)
 
 
-def test_derivatives_rollout_explain_and_pickle() -> None:
-    scene = models.on_plate(models.ball(), TABLE, models.FRICTION)
-    q = models.free_q([0.01, 0.02, 0.0492])
-    v = np.array([0.1, 0.0, -0.05, 1.0, 2.0, 0.0])
-    assert_derivatives(scene, q, v)
-    assert "table of 200 rows down to 2 mm" in str(scene.explain(q))
-    again = pickle.loads(pickle.dumps(scene))
-    assert again.pairs[0].law == TABLE
-    np.testing.assert_array_equal(
-        again.external_forces(q, v)[1].vector, scene.external_forces(q, v)[1].vector
-    )
-    runs = sp.Simulation(scene, sp.Adaptive()).rollout(
-        [q, q], None, 0.01, vary={"ball-plate.law": [TABLE, sp.TableLaw([0, 1], [0, 1e4])]}
-    )
-    assert runs[0].q[-1, 2] != runs[1].q[-1, 2]
+def test_it_is_explained_and_pickled() -> None:
+    scene = models.on_plate(models.ball(), TABLE)
+    assert "table of 200 rows down to 2 mm" in str(scene.explain())
+    assert pickle.loads(pickle.dumps(scene)).pairs[0].law == TABLE
 
 
 def test_a_scenario_names_a_file_beside_it(tmp_path) -> None:

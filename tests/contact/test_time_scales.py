@@ -7,7 +7,6 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.contact import NormalLaw
-from sphshell_pin.contact.normal_law import inverse
 
 MASS, SPEED, DEPTH = 0.7, 0.3, 2e-3
 RUBBER = (4e6, 0.48)
@@ -32,13 +31,6 @@ def test_contact_time_by_its_integral(exponent: float) -> None:
     assert law.contact_time(DEPTH, SPEED) == pytest.approx(expected, rel=1e-6)
     assert NormalLaw.contact_time(law, DEPTH, SPEED) == pytest.approx(expected, rel=1e-6)
     assert law.contact_time(DEPTH, 0.0) == math.inf
-
-
-def test_what_increases_is_inverted_to_the_last_bits() -> None:
-    for value in (1e-30, 1e-7, 3.0, 1e30):
-        assert inverse(lambda x: x**3, value) ** 3 == pytest.approx(value, rel=1e-15)
-    assert inverse(lambda x: 1e-6 * x, 1e-12) == pytest.approx(1e-6, rel=1e-15)
-    assert inverse(math.exp, 0.0) == inverse(math.exp, -1.0) == 0.0
 
 
 # The damping [N s/m] at DEPTH, half of DEPTH and none.
@@ -133,20 +125,10 @@ SLIPS = [
     (mindlin(), LOAD, DISC, half(STIFF)),
     (mindlin(), LOAD, math.nan, math.inf),
     (mindlin(), LOAD, 0.0, math.inf),
-    *(
-        (mindlin(damping_time=time), LOAD, DISC, min(half(STIFF), 20 * MASS / (time * STIFF)))
-        for time in (1e-4, 1.0)
-    ),
-    *(
-        (
-            mindlin(rolling=0.02, rolling_speed=speed),
-            load,
-            DISC,
-            min(half(STIFF), 20 * MASS * speed / (1.5 * 0.02 * load) if load else math.inf),
-        )
-        for speed in (1e-5, 10.0)
-        for load in (LOAD, 0.5, 0.0)
-    ),
+    (mindlin(damping_time=1.0), LOAD, DISC, 20 * MASS / STIFF),
+    (mindlin(rolling=0.02, rolling_speed=1e-5), LOAD, DISC, 20 * MASS * 1e-5 / (0.03 * LOAD)),
+    (mindlin(rolling=0.02, rolling_speed=1e-5), 0.0, DISC, half(STIFF)),
+    (mindlin(rolling=0.02, rolling_speed=10.0), LOAD, DISC, half(STIFF)),
 ]
 
 

@@ -17,15 +17,12 @@ from sphshell_pin.patches import ShellTaxels
 from tests.models import ARM_Q, LAW, add_body, arm, ball, empty, free_q, on_plate, plate
 
 BALL, HIGH, NAN = Sphere(0.05, "ball"), free_q([0, 0, 1]), float("nan")
-WRONG_PLACEMENTS = {
-    "scaled": pin.SE3(2 * np.eye(3), np.zeros(3)),
-    "mirrored": pin.SE3(np.diag([1.0, 1.0, -1.0]), np.zeros(3)),
-    "not finite": pin.SE3(np.eye(3), np.array([0.0, np.nan, 0.0])),
-    "turn not finite": pin.SE3(np.full((3, 3), np.nan), np.zeros(3)),
-    "matrix": np.eye(4),
-    "text": "above",
-    "class": pin.SE3,
-}
+WRONG_PLACEMENTS = [
+    pin.SE3(2 * np.eye(3), np.zeros(3)),
+    pin.SE3(np.diag([1.0, 1.0, -1.0]), np.zeros(3)),
+    pin.SE3(np.eye(3), np.array([0.0, np.nan, 0.0])),
+    np.eye(4),
+]
 
 
 @contextmanager
@@ -142,20 +139,13 @@ NAMES = np.array(["a", "b"])
 ZEROS, FORGOT = [0, 0, 0], r"did you forget \(\)"
 Call = Callable[[], object]
 REFUSED: list[tuple[str, Call]] = [
-    *(("placement", lambda one=one: add(placement=one)) for one in WRONG_PLACEMENTS.values()),
-    *(
-        ("placement", lambda one=one: press(shell=plate(), placement=one))
-        for one in WRONG_PLACEMENTS.values()
-    ),
+    *(("placement", lambda one=one: add(placement=one)) for one in WRONG_PLACEMENTS),
+    ("placement", lambda: press(shell=plate(), placement=np.eye(4))),
     ("sphere", lambda: add(sphere=0.1)),
-    ("sphere", lambda: add(sphere=Sphere)),
     ("shell", lambda: add(shell="x.stl")),
-    ("law", lambda: add(law="impact")),
     ("law = None must be a law of this package", lambda: add(law=None)),
     ("friction", lambda: add(friction=0.3)),
-    ("friction", lambda: add(friction=sp.CoulombFriction)),
     ("frame", lambda: add(frame=None)),
-    ("frame", lambda: add(frame=3)),
     ("name", lambda: add(name=5)),
     (FORGOT, lambda: add(law=sp.ImpactLaw)),
     (FORGOT, lambda: run(controller=sp.GravityCompensation)),
@@ -166,18 +156,12 @@ REFUSED: list[tuple[str, Call]] = [
     ("placement.* must not be given", lambda: on_sphere(placement=pin.SE3.Identity())),
     ("method = 'smooth' must not be given", lambda: on_sphere(method="smooth")),
     ("spheres = .* must be spheres, one at least", lambda: spheres([])),
-    ("must be spheres, one at least", lambda: spheres(BALL)),
     (r"spheres\[1\] = 'ball' must be a Sphere", lambda: spheres([BALL, "ball"])),
-    ("law", lambda: change(law=None)),
-    ("law", lambda: change(law=sp.ImpactLaw)),
     ("friction", lambda: change(friction=0.3)),
-    ("law", lambda: change(law=np.zeros((50, 50)))),
     ("lock", lambda: Scene(arm(), lock=None)),
     ("lock", lambda: Scene(arm(), lock=["two_joint", "two_joint"])),
-    ("lock", lambda: Scene(arm(), lock=[3])),
     (r"lock.*write \['two_joint'\]", lambda: Scene(arm(), lock="two_joint")),
     ("joints", lambda: sp.GravityCompensation(joints=3)),
-    ("joints", lambda: sp.GravityCompensation(joints="two_joint")),
     (r"q_lock.*lock", lambda: Scene(arm(), q_lock=ARM_Q)),
     (r"q_lock.*'ball_joint'.*unit length", wrong_q_lock),
     (r"'hinge'.*addJointFrame", lambda: without_a_frame(True)),
@@ -190,25 +174,17 @@ REFUSED: list[tuple[str, Call]] = [
     ("give the shell", lambda: press(shell_frame="ball")),
     ("give the shell", lambda: press(placement=pin.SE3.Identity())),
     ("shell", lambda: press(shell=5)),
-    *(("number", lambda one=one: Sphere(one, "ball")) for one in (True, "1e-3", 1j, None)),
-    *(
-        (r"offset.*numbers", lambda one=one: Sphere(0.1, "ball", [one] * 3))
-        for one in (True, "1e-3", 1j, None)
-    ),
+    (r"offset.*numbers", lambda: Sphere(0.1, "ball", ["1e-3"] * 3)),
     *(
         ("q = .* must hold 7 numbers", lambda one=one: at(one))
-        for one in ([True] * 7, ["0"] * 7, [1j] * 7, np.zeros(7, dtype=complex))
+        for one in ([True] * 7, ["0"] * 7, np.zeros(7, dtype=complex))
     ),
     (r"q has shape \(3,\), must have shape \(7,\)", lambda: at(np.zeros(3))),
-    (r"v has shape \(5,\)", lambda: at(HIGH, np.zeros(5))),
-    ("q has shape", lambda: on_plate(ball(), LAW).external_forces(np.zeros(6))),
     ("v has shape", lambda: on_plate(ball(), LAW).external_forces(HIGH, np.zeros(5))),
-    ("q has shape", lambda: run(np.zeros(6))),
     ("q = .* must hold 7 numbers", lambda: at(np.ma.masked_equal(HIGH, 0.0))),
     ("scale = .* makes the shell too large", lambda: plate().transformed(1e308)),
     ("name = .* must be a name", lambda: on_plate(ball(), LAW).replace_pair(NAMES, law=LAW)),
     ("pair = .* must be a name", lambda: ShellTaxels(NAMES)),
-    ("v has shape", lambda: run(v=np.zeros(7))),
     ("q = .* finite", lambda: run(HIGH * np.nan)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),
     *(("duration", lambda one=one: run(duration=one)) for one in (-1.0, NAN, np.inf)),

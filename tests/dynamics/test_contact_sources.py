@@ -52,25 +52,22 @@ def test_source_between_two_moving_bodies() -> None:
     for name in ("one", "two"):
         add_body(model, name, pin.JointModelFreeFlyer(), frame=pin.SE3.Random())
     q = pin.integrate(model, pin.neutral(model), np.random.default_rng(0).normal(size=12))
-    point, normal = np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8])
-    seen = []
+    point, normal, seen = np.array([0.3, 0.2, 0.1]), np.array([0.0, 0.6, 0.8]), []
 
     def find(*poses: pin.SE3):
         seen.append([pin.SE3(pose) for pose in poses])
-        return np.stack([point, -point]), np.stack([normal, normal]), np.array([0.01, 0.02])
+        return [point, -point], [normal, normal], [0.01, 0.02]
 
     scene = Scene(model)
     scene.add_contact_source(find, "one", "two", linear_law(1000.0), None, name="gears")
     fext = scene.external_forces(q, np.random.default_rng(1).normal(size=12))
-    for pose, name in zip(seen[0], ("one", "two"), strict=True):
-        assert pose.isApprox(pose_of(model, q, name), 1e-12)
-    on_one, on_two = (
-        pose_of(model, q, f"{name}_joint").act(force).vector
-        for name, force in zip(("one", "two"), list(fext)[1:], strict=True)
-    )
+    wrenches = []
+    for k, name in enumerate(("one", "two")):
+        assert seen[0][k].isApprox(pose_of(model, q, name), 1e-12)
+        wrenches.append(pose_of(model, q, f"{name}_joint").act(fext[k + 1]).vector)
     torque = np.cross(point, 10.0 * normal) + np.cross(-point, 20.0 * normal)
-    assert on_one == pytest.approx(np.concatenate([30.0 * normal, torque]), abs=1e-11)
-    assert on_two == pytest.approx(-on_one, abs=1e-12)
+    assert wrenches[0] == pytest.approx(np.concatenate([30.0 * normal, torque]), abs=1e-11)
+    assert wrenches[1] == pytest.approx(-wrenches[0], abs=1e-12)
     contacts = scene.contacts(q)
     assert contacts.point_world == pytest.approx(np.stack([point, -point]), abs=1e-14)
     assert contacts.normal_force == pytest.approx([10.0, 20.0])

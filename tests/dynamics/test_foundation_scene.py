@@ -49,18 +49,6 @@ def test_pressure_adds_up_to_the_contact() -> None:
         sp.foundation_pressure(shell, center, 1.0, sp.ImpactLaw(1e4))  # type: ignore[arg-type]
 
 
-def test_rows_add_up() -> None:
-    """One row for each patch, which together are the pair's wrench."""
-    scene = free_ball(edged("box"), DAMPED, COULOMB)
-    q, v = free_q([-1.1, 0.2, -1.3]), np.array([0.3, -0.2, 0.1, 0.5, -0.4, 2.0])
-    contacts = scene.contacts(q, v)
-    assert len(contacts) == 2
-    force = (contacts.normal_force[:, None] * contacts.normal_world).sum(axis=0)
-    force += contacts.friction_force_world.sum(axis=0)
-    total = scene.external_forces(q, v)[1]
-    assert total.linear == pytest.approx(force, rel=1e-12)
-
-
 @pytest.mark.parametrize("spin", [0.05, 0.5, 5.0])
 def test_spinning_ball_feels_a_moment(spin: float) -> None:
     """Friction of every point by its own speed: the integral over the disc of overlap."""
@@ -101,18 +89,6 @@ def test_bristle_holds_at_the_center_of_pressure() -> None:
 def drop(scene, q, v, duration, **options):
     integrator = sp.Adaptive(rtol=1e-9, atol=1e-11, **options)
     return sp.Simulation(scene, integrator).run(q, v, duration)
-
-
-@pytest.mark.parametrize("method", ["smooth", "facets"])
-def test_energy_over_a_crease(method: str) -> None:
-    """Sliding over the edge of a block, and over the border of a sheet."""
-    for shell in (edged("cube"), edged("sheet")):
-        height = 2.0 if shell.side == "outside" else 0.0
-        scene = free_ball(shell, LAW, gravity=9.81, method=method)
-        q = free_q([1.2, 0.3, height + 0.95])
-        result = drop(scene, q, np.array([1.5, 0.1, 0, 0, 0, 0]), 0.8)
-        assert result.q[-1, 0] > 2.2
-        assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
 
 
 def test_energy_with_friction() -> None:

@@ -4,12 +4,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.optimize import brentq, curve_fit
 from scipy.spatial import ConvexHull
 
 import sphshell_pin as sp
 from sphshell_pin import testing
-from sphshell_pin.errors import InvalidParameter
 from tests.contact.test_planes import egg, pose, rotations, scene_of, support
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
 from tests.meshes import cube, grid_plate, icosphere
@@ -69,22 +67,6 @@ def test_rolling_loses_no_energy() -> None:
     result = sp.Simulation(scene, sp.Adaptive(rtol=1e-9, atol=1e-12)).run(q, v, 0.05)
     kept = result.energy.kinetic + result.energy.potential + result.energy.elastic
     assert np.ptp(kept) < 3e-6 * np.ptp(result.energy.kinetic)
-
-
-@pytest.mark.parametrize("face", [0.0, np.pi / 2])
-def test_a_box_stays_on_its_face(face: float) -> None:
-    """Put down level it neither falls over nor jitters, whatever its direction."""
-    shell, law = sp.Shell(*cube(0.2)), sp.ImpactLaw(1e6, 1.0, 500.0, 1e-4)
-    scene = scene_of(shell, law, sp.BristleFriction(0.4, 0.3, 1e5, 50.0))
-    turn = pin.utils.rotate("z", 0.3) @ pin.utils.rotate("x", face)
-    low = float((np.asarray(shell.vertices) @ turn[2]).min())
-    q = np.concatenate(([0.1, 0.2, -low], pin.Quaternion(turn).coeffs()))
-    result = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(q, np.zeros(6), 1.0)
-    assert np.abs(result.v[:, 3:]).max() < 1e-9
-    assert np.abs(result.q[:, 3:] - q[3:]).max() < 1e-9
-    assert np.abs(result.q[:, :2] - q[:2]).max() < 1e-9
-    crown = 0.02 / (2000 * shell.size)  # of the face
-    assert result.q[-1, 2] == pytest.approx(-low + crown - 9.81 / 1e6, abs=1e-6)
 
 
 def test_a_sensor_and_rows_show_the_force_on_the_body_of_the_plane() -> None:
@@ -288,58 +270,3 @@ def test_a_cylinder_that_rolls_is_slowed_by_the_dissipation() -> None:
     rate = -np.polyfit(result.t[late], np.log(np.abs(result.v[late, 5])), 1)[0]
     expected = b * 9.81 * (2 * radius * depth / 5) / (1.5 * radius**2)
     assert rate == pytest.approx(expected, rel=0.02)
-
-
-@pytest.mark.parametrize(("power", "exponent"), [(-2.0, 1 / 3), (-0.5, 2 / 3), (0.6, 5 / 2)])
-def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: float) -> None:
-    """The tilt of Euler's disk is a (1 - t / end)^exponent: its energy is 3/2 m g radius tilt.
-
-    A loss as tilt^-2, of the air below it: Moffatt, Nature 404 (2000) 833; as its speed of rolling,
-    tilt^-1/2: Easwar, Rouyer and Menon, Phys. Rev. E 66 (2002) 045102. It acts as a moment against
-    the rotation; what is measured is that the contact adds no loss of its own. Last that of the law
-    alone, b N mean(gap rate^2): the disc is depth / tilt wide and sqrt(depth / tilt) long where it
-    touches, so that the volume gives tilt^(3/5).
-    """
-    own = power > 0
-    radius, thickness, mass, tilt, end = 0.04, 0.001, 0.2, 0.1, 0.6
-    shell = sp.Shell.from_geometry(coal.Cylinder(radius, thickness), segments=48)
-    inertia = pin.Inertia.FromCylinder(mass, radius, thickness)
-    friction = sp.CoulombFriction(0.02, 0.02, 0.01, 0.1)
-    law = sp.FoundationLaw(1e7, 1e-3, 10.0) if own else sp.FoundationLaw(1e8, 1e-3)
-    scene = thrown(shell, inertia, law, friction)
-    turn = pin.Quaternion(pin.utils.rotate("y", tilt)).coeffs()
-    touch = radius * np.sin(tilt) + thickness / 2 * np.cos(tilt)
-
-    def lift(z: float) -> float:
-        return scene.contacts(np.r_[0, 0, z, turn]).normal_force.sum() - mass * 9.81
-
-    q = np.r_[0, 0, brentq(lift, 0.9 * touch, touch - 1e-7), turn]
-    spin = np.sqrt(4 * 9.81 * np.sin(tilt) / radius)  # about the diameter through the contact
-    loss = exponent * 1.5 * mass * 9.81 * radius * tilt / end  # [W], at first
-
-    def tilt_of(q: np.ndarray) -> float:
-        return float(np.linalg.norm(pin.Quaternion(q[3:7]).matrix()[2, :2]))
-
-    def moment(_t, q, v, _contacts) -> np.ndarray:
-        return np.r_[0, 0, 0, -loss * (tilt_of(q) / tilt) ** power * v[3:] / (v[3:] @ v[3:])]
-
-    duration, more = end * (1 - 0.35 ** (1 / exponent)), {"controller": moment, "control_dt": 5e-4}
-    if own:
-        duration, more = 1.1, {}
-    result = run(scene, sp.Adaptive(1e-5, 1e-8), q, [0, 0, 0, -spin, 0, 0], duration, **more)
-    tilts = [tilt_of(one) for one in result.q]
-
-    def expected(t, a, b, c):
-        return a * np.maximum(1 - t / b, 1e-9) ** c
-
-    guess = tilt, 2.0 if own else end, exponent
-    fitted = curve_fit(expected, result.t, tilts, guess)[0]
-    assert fitted[2] == pytest.approx(exponent, rel=0.05 if own else 0.03)
-    assert own or fitted[1] == pytest.approx(end, rel=0.02)
-
-
-def test_laws_and_friction_that_need_a_radius_are_refused() -> None:
-    with pytest.raises(InvalidParameter, match=r"take law.on_plane\(radius\), or a FoundationLaw"):
-        scene_of(box(), sp.HertzLaw(1e9, 0.3))
-    with pytest.raises(InvalidParameter, match="follows from the radius"):
-        scene_of(box(), LAW, sp.MindlinFriction.of("rubber", "rubber"))

@@ -7,7 +7,7 @@ import sys
 import threading
 import warnings
 from contextlib import suppress
-from dataclasses import astuple, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -16,10 +16,9 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import errors, robots
+from sphshell_pin import errors
 from sphshell_pin.dynamics.result.result_parts import Event, Kept, Origin
 from sphshell_pin.dynamics.run import advance
-from sphshell_pin.dynamics.scene.explain import explain_pairs
 from tests import models
 from tests.results import assert_same_bits
 from tests.texts import DATA
@@ -70,7 +69,6 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
     mixed.addJoint(pin.JointModelRUBZ(), pin.SE3.Identity())
     parts = {
         "flyer": (pin.JointModelFreeFlyer(), slice(3, 7)),
-        "hinge": (pin.JointModelRX(), slice(0, 0)),
         "sled": (pin.JointModelPlanar(), slice(2, 4)),
         "mixed": (mixed, slice(1, 3)),
         "wheel": (pin.JointModelRUBX(), slice(0, 2)),
@@ -79,16 +77,13 @@ def test_a_joint_that_is_not_of_unit_length_is_named() -> None:
     model, parent = models.empty(), 0
     for name, (joint, _) in parts.items():
         parent = models.add_body(model, name, joint, parent)
-    scene = sp.Scene(model)
     for (name, (_, part)), scale in product(parts.items(), (0.0, 0.9, 2.0)):
-        first = model.joints[model.getJointId(f"{name}_joint")].idx_q
-        q = pin.neutral(model)
+        q, first = pin.neutral(model), model.joints[model.getJointId(f"{name}_joint")].idx_q
         q[first + part.start : first + part.stop] *= scale
-        if part.stop:
-            with pytest.raises(errors.InvalidParameter, match=f"'{name}_joint'.*unit") as caught:
-                scene.check_state(q)
-            assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
-            assert len(caught.value.value) == part.stop - part.start
+        with pytest.raises(errors.InvalidParameter, match=f"'{name}_joint'.*unit") as caught:
+            sp.Scene(model).check_state(q)
+        assert np.linalg.norm(caught.value.value) == pytest.approx(scale)
+        assert len(caught.value.value) == part.stop - part.start
 
 
 def test_deep_start() -> None:
@@ -97,16 +92,6 @@ def test_deep_start() -> None:
     assert caught.value.pair == "ball-plate"
     assert caught.value.depth == pytest.approx(0.6 * RADIUS)
     assert caught.value.radius == RADIUS
-
-
-def test_a_failed_run_leaves_the_simulation_usable() -> None:
-    sim = bouncing()
-    before = sim.run(*START, 0.05)
-    with pytest.raises(errors.InvalidParameter):
-        sim.run(np.zeros(3), np.zeros(6), 0.1)
-    with pytest.raises(errors.DeepStart):
-        sim.run(models.free_q([0, 0, 0.01]), np.zeros(6), 0.1)
-    assert np.array_equal(sim.run(*START, 0.05).q, before.q)
 
 
 def test_a_python_controller_sees_contacts() -> None:
@@ -182,9 +167,7 @@ def _with(result: sp.Result, part: str, **values: object) -> sp.Result:
     [
         (lambda r: replace(r, q=r.q.astype("f4")), "'q' holds float32, not float64"),
         (lambda r: replace(r, q=r.q[1:]), r"'q' has the shape .* with n = "),
-        (lambda r: replace(r, v=r.v[0]), r"'v' has the shape"),
         (lambda r: replace(r, t=r.t[::-1].copy()), "'t' does not rise at row 0"),
-        (lambda r: replace(r, t=np.full_like(r.t, np.nan)), "'t' does not rise"),
         (lambda r: replace(r, q=np.ma.masked_less(r.q, 0.0)), "'q' is a masked array"),
         (lambda r: replace(r, pairs=("a", "a")), "header.pairs does not list each pair once"),
         (lambda r: replace(r, events=(Event("0", r.pairs[0], "stick"),)), "header.events"),
@@ -232,38 +215,6 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
 LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 
 
-def of_all_kinds() -> tuple[sp.Scene, np.ndarray]:
-    """Return a scene of an arm with pairs of every kind, and a state of the arm (nq,)."""
-    arm, plate = robots.load("panda"), models.plate()
-    scene, where = sp.Scene(arm.model), pin.SE3(np.eye(3), np.array([0.4, 0.1, 0.2]))
-    frames = ("panda_link3", "panda_link5", "panda_link7", "panda_hand")
-    for (k, frame), method in product(enumerate(frames), ("smooth", "facets")):
-        ball = sp.Sphere(0.02, frame, (0.03 * k, 0.01, 0.0))
-        friction = sp.BristleFriction(0.6, 0.5, 1e5, 30.0) if k % 2 else None
-        more = {"law": LAW, "friction": friction, "method": method, "name": f"{method}-{k}"}
-        scene.add_contact(ball, plate, placement=where, **more)
-    scene.add_contact(sp.Sphere(0.02, frames[0]), plate, frame=frames[2], law=LAW, name="moving")
-    scene.add_contact(sp.Sphere(0.02, frames[3]), sp.Sphere(0.03, frames[1]), law=LAW, name="two")
-    scene.add_contact(sp.Plane("universe"), plate, frame=frames[3], law=LAW, name="plane")
-    scene.add_contact_source(nowhere, frames[0], frames[1], law=LAW, name="own")
-    return scene, np.asarray(arm.q0)
-
-
-def nowhere(pose_i: pin.SE3, pose_j: pin.SE3) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
-
-
-def test_the_figures_of_pairs_do_not_depend_on_the_other_pairs() -> None:
-    scene, q = of_all_kinds()
-    rng = np.random.default_rng(1)
-    for _ in range(5):
-        state = scene.check_state(q + rng.normal(scale=0.2, size=q.size), rng.normal(size=q.size))
-        together = explain_pairs(scene, *state)
-        for pair, figures in zip(scene.pairs, together, strict=True):
-            (alone,) = explain_pairs(scene.with_pairs((pair,)), *state)
-            np.testing.assert_equal(astuple(figures), astuple(alone))
-
-
 def test_what_is_kept_of_a_pair_goes_with_it() -> None:
     scene = sp.Scene(models.ball())
     scene.add_contact(sp.Sphere(0.006, "ball"), models.plate(), law=LAW, name="c")
@@ -283,10 +234,8 @@ class _Enough(Exception):
     ("integrator", "record_dt", "rows"),
     [
         (sp.SemiImplicitEuler(1e-5), None, "1.5e+06 rows"),
-        (sp.SemiImplicitEuler(1e-5), 1e-7, "1.5e+06 rows"),
         (sp.Adaptive(), 1e-6, "1.5e+07 rows"),
         (sp.SemiImplicitEuler(1e-5), 1e-3, ""),
-        (sp.SemiImplicitEuler(2e-5), None, ""),
         (sp.Adaptive(), None, ""),
     ],
 )

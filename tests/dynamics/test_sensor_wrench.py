@@ -5,7 +5,6 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from tests import models, urdf
 from tests.texts import DATA, text_of
@@ -132,7 +131,7 @@ def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
 
 @pytest.mark.parametrize("integrator", [sp.Adaptive(), sp.Implicit(), sp.RungeKutta4(1e-3)])
 def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
-    """The knuckle is locked, where it is straight."""
+    """What a joint in place of the mount, which rests, would transmit; the knuckle is locked."""
     rate, model = 250.0, arm()
     scene = sp.Scene(model, lock=["knuckle"])
     result = sp.Simulation(scene, integrator, [sensor(rate=rate)]).run(
@@ -140,31 +139,13 @@ def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
     )
     log = result.sensors["wrist"]
     assert np.allclose(log.t, result.t, rtol=0, atol=1e-12)
-    gravity = np.array([0.0, 0.0, -9.81])
+    whole = pin.buildModelFromXML(URDF.replace('"mount" type="fixed"', '"mount" type="revolute"'))
+    data, mount = whole.createData(), whole.getJointId("mount")
+    first = np.eye(whole.nq)[whole.joints[whole.getJointId("shoulder")].idx_v]
     for q, v, seen in zip(result.q, result.v, log.values, strict=True):
-        pose = poses(model, np.append(q, 0.0))
-        axis, mount = pose["shoulder"].rotation @ np.array([0.0, 0.6, 0.8]), pose["mount"]
-        bodies = {}  # mass, center of mass from the shoulder and inertia about it
-        for name, (mass, com, own) in PARTS.items():
-            turn = pose[name].rotation
-            r = pose[name].act(np.array(com)) - pose["shoulder"].translation
-            bodies[name] = mass, r, turn @ np.diag(own) @ turn.T
-        # About the fixed axis: the sum of m r^2 and the parts' own inertia; gravity's torque.
-        inertia = torque = 0.0
-        for mass, r, own in bodies.values():
-            inertia += axis @ own @ axis + mass * (r @ r - (r @ axis) ** 2)
-            torque += axis @ np.cross(r, mass * gravity)
-        arm_of_mount = mount.translation - pose["shoulder"].translation
-        spin, alpha = v[0] * axis, torque / inertia * axis
-        force, moment = np.zeros(3), np.zeros(3)
-        for mass, r, own in (bodies[name] for name in BEYOND):
-            acceleration = np.cross(alpha, r) + np.cross(spin, np.cross(spin, r))
-            push = mass * (acceleration - gravity)
-            force += push
-            moment += own @ alpha + np.cross(spin, own @ spin)
-            moment += np.cross(r - arm_of_mount, push)
-        expected = np.concatenate([mount.rotation.T @ force, mount.rotation.T @ moment])
-        assert np.allclose(seen, expected, rtol=0, atol=1e-9)
+        a = pin.aba(scene.model, scene.model.createData(), q, v, np.zeros(1))
+        pin.rnea(whole, data, q * first, v * first, a * first)
+        assert np.allclose(seen, data.f[mount].vector, rtol=0, atol=1e-9)
     assert np.abs(log.values).max() > 9
 
 
@@ -239,21 +220,6 @@ def test_what_a_joint_adds_is_transmitted():
     assert result.stats.joints[joint].cut_time > 0.19
 
 
-def test_joints_that_mimic_others():
-    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
-    model = robots.load("panda", mimic=True).model
-    finger = model.names[model.njoints - 1]
-    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
-    force = rest(sp.Scene(model), q, sensor("panda_hand"))[:3]
-    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
-    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
-    turn = models.pose_of(model, q, "panda_hand").rotation
-    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
-    follower = sp.JointTorqueSensor(name="s", joint=finger)
-    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
-        read(sp.Scene(model), q, None, [follower])
-
-
 def test_the_drive_of_joints_that_follow_carries_them():
     """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
     model = pin.buildModelFromXML(text_of("robots/two_slides.urdf"), mimic=True)
@@ -262,6 +228,9 @@ def test_the_drive_of_joints_that_follow_carries_them():
     result = read(sp.Scene(model), [0.1], sp.GravityCompensation(), [drive, wrench])
     assert abs(result.sensors["drive"].values[0, 0] - 9.81 * (1.0 + 2 * 0.5)) < 1e-12
     assert abs(result.sensors["wrench"].values[0, 2] - 9.81 * 0.5) < 1e-12
+    follower = sp.JointTorqueSensor(name="s", joint="second")
+    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
+        read(sp.Scene(model), [0.1], None, [follower])
     # Let go, the first falls with g (1 + 1) / (1 + 4 0.5): the drive gives nothing.
     fall = read(sp.Scene(model), [0.1], None, [drive, wrench])
     assert abs(fall.sensors["drive"].values[0, 0]) < 1e-12
@@ -277,21 +246,6 @@ def test_bodies_of_an_mjcf_file(frame, mass):
     assert np.allclose(found, [0, 0, 9.81 * mass, 0, 0, 0], rtol=0, atol=1e-10)
     with pytest.raises(sp.SphshellError, match="'s' is a point on a link"):
         read(scene, pin.neutral(model), None, [sensor("s")])
-
-
-@pytest.mark.parametrize("lock", [(), ("r/knuckle",), ("shoulder",)])
-def test_robots_that_were_joined(lock):
-    two = arm()
-    for k, frame in enumerate(two.frames):
-        two.frames[k].name = f"r/{frame.name}"
-    for k in range(1, two.njoints):
-        two.names[k] = f"r/{two.names[k]}"
-    both = pin.appendModel(arm(), two, 0, pin.SE3(np.eye(3), np.array([0.0, 1.0, 0.0])))
-    q = np.array([0.4, -0.7, 0.2, 0.9])
-    left = q[[name not in lock for name in list(both.names)[1:]]]
-    scene = sp.Scene(both, lock=lock, q_lock=q if lock else None)
-    for frame, posture in (("mount", q[:2]), ("r/mount", q[2:])):
-        assert np.abs(rest(scene, left, sensor(frame)) - weight(arm(), posture)).max() < 1e-10
 
 
 def test_nothing_holds_a_floating_base():

@@ -86,6 +86,19 @@ def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[n
     assert np.allclose(*ends, rtol=0, atol=1e-12 if exact else 2e-5)
 
 
+def test_contacts_that_begin_at_once_have_rings_of_their_own() -> None:
+    law, ends = sp.ImpactLaw.hertz(0.05, 1e6, 0.4, 1e6, 0.4), []
+    friction = sp.MindlinFriction(0.3, 0.3, 1e6, 0.4, rings=4, torsional=True)
+    spheres = [sp.Sphere(0.02, "ball", (x, 0.0, -0.03)) for x in (-0.02, 0.02)]
+    q, v = models.free_q([0, 0, 0.055]), [0.3, 0.1, -0.5, 0.0, 0.0, 3.0]
+    for together in (True, False):
+        scene = scene_of(spheres, together=together, law=law, friction=friction)
+        result = models.run(scene, sp.RungeKutta4(1e-4), q, v, 0.2)
+        assert result.stats.pairs[scene.pairs[0].name].touches > 0
+        ends.append(np.concatenate([result.q[-1], result.v[-1]]))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-10)
+
+
 @pytest.mark.parametrize("speed", [30.0, 3000.0])
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(1e-2), sp.Adaptive(1e-5)])
 def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  # type: ignore[no-untyped-def]

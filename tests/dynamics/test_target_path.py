@@ -62,18 +62,12 @@ def test_straight_pieces_stop_at_corners_and_a_spline_does_not() -> None:
     for spline in (False, True):
         curve = Curve.through(POINTS, None, spline=spline)
         timing = Timing.along(curve, 0.0, 0.05, 0.5, 5.0)
-        at = timing.reaching(_places_of(curve, POINTS))
-        near = np.array([np.diff(timing.at(np.array([t - 1e-6, t + 1e-6])))[0] for t in at[1:-1]])
-        speeds = near / 2e-6
+        passed = np.linalg.norm(POINTS[1:-1, None] - curve.points, axis=2).argmin(axis=1)
+        assert curve.points[passed] == pytest.approx(POINTS[1:-1], abs=1e-12)
+        near = timing.reaching(curve.along[passed])[:, None] + [-1e-6, 1e-6]
+        speeds = np.diff(timing.at(near.ravel()).reshape(-1, 2))[:, 0] / 2e-6
         assert (speeds > 0.04).all() if spline else (speeds < 1e-4).all()
         assert len(curve.corners) == (2 if spline else len(POINTS))
-
-
-def _places_of(curve: Curve, points) -> np.ndarray:
-    """Return the arc lengths at which the curve goes through `points`."""
-    away = np.linalg.norm(points[:, None] - curve.points[None], axis=2)
-    assert away.min(axis=1).max() < 1e-12
-    return curve.along[away.argmin(axis=1)]
 
 
 def test_a_spline_that_turns_back_stops_there() -> None:

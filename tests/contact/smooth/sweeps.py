@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 
 from tests.contact.helpers import energy, force_sum
-from tests.contact.smooth.test_potential import query
 from tests.contact.walks import borders, steepest
 from tests.oracle.pieces import potential_and_force
 
@@ -16,6 +15,10 @@ WIDTH = 1e-11
 # A jump is a change by more than this share of the force.
 LIMIT = 1e-6
 UP = np.array([0.0, 0.0, 1.0])
+
+
+def query(shell, center):
+    return shell.contacts(center, 1.0, method="smooth")
 
 
 def segment(start, end, nodes: int):

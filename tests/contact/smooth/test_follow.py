@@ -15,29 +15,20 @@ def rows(contacts, point, normal):
     return table[np.lexsort(table.T)]
 
 
-def paths(name: str):
-    """Slow paths (n, 3) of centres: along the surface, and in and out of touch."""
-    rng = np.random.default_rng(4)
-    if name in SURFACES:
-        centers, normals = SURFACES[name].probes(6, 0.03, seed=4)
-    else:
-        shell = edged(name)
-        edges = shell.edge_vertices[np.flatnonzero(shell.edge_class > 0)]
-        normals = directions(rng, 12)
-        centers = shell.vertices[rng.choice(edges, 12)[:, 0]] + 0.97 * normals
-    for center, normal in zip(centers, normals, strict=True):
-        pace = rng.choice([1e-5, 1e-3, 5e-3])
-        along = np.cross(normal, rng.normal(size=3))
-        t = np.arange(120)[:, None]
-        yield center + pace * t * along + 0.03 * np.sin(0.1 * t) * normal
+def slow_paths(shell):
+    """Centres (n, 3) that move along and across the surface, in and out of touch."""
+    rng, t = np.random.default_rng(4), np.arange(120)[:, None]
+    for place in shell.vertices[rng.choice(len(shell.vertices), 12)]:
+        (normal, along), pace = directions(rng, 2), rng.choice([1e-5, 1e-3, 5e-3])
+        yield place + 0.97 * normal + pace * t * along + 0.03 * np.sin(0.1 * t) * normal
 
 
-@pytest.mark.parametrize("name", ["bowl", "torus inside", "wavy above", "can", "cube", "sheet"])
+@pytest.mark.parametrize("name", ["torus inside", "wavy above", "can", "sheet"])
 def test_scene_finds_what_the_shell_finds(name: str) -> None:
     shell = shell_of(name, 0.3) if name in SURFACES else edged(name)
     scene = on_shell(ball(gravity=0.0), shell, linear_law(1000.0), radius=1.0, method="smooth")
     found = 0
-    for path in paths(name):
+    for path in slow_paths(shell):
         for center in path:
             followed = scene.contacts(free_q(center), np.zeros(6))
             fresh = shell.contacts(center, 1.0, method="smooth")

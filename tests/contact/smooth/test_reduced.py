@@ -11,13 +11,10 @@ import pytest
 
 from sphshell_pin import Shell
 from tests.contact.helpers import energy
+from tests.contact.smooth.sweeps import query
 from tests.contact.smooth.test_real_surfaces import jump, steepest_between
 
 REDUCED = sorted((Path(__file__).parents[2] / "data" / "reduced").glob("*.npz"))
-
-
-def query(shell: Shell, center):
-    return shell.contacts(center, 1.0, method="smooth")
 
 
 def test_the_meshes_are_there() -> None:

@@ -12,7 +12,6 @@ from tests import meshes
 from tests.contact.helpers import directions
 from tests.contact.smooth import sweeps
 from tests.contact.smooth.surfaces import SURFACES, can
-from tests.contact.smooth.test_potential import query
 from tests.contact.smooth.test_true_edges import cone
 from tests.studies import mostly_studies
 
@@ -36,13 +35,6 @@ def open_cap():
     return vertices, elements, (vertices + [0.0, 0.0, 4.0]) / 4
 
 
-def gutter():
-    flat, elements = meshes.random_plate(200, seed=3, size=4.0, slivers=False)
-    x, y, _ = flat.T
-    normals = np.stack([np.sin(x / 3), 0 * x, np.cos(x / 3)], axis=1)
-    return 3 * normals + np.stack([0 * x, y, 0 * x - 3], axis=1), elements, normals
-
-
 def larger(mesh):
     return 4 * mesh[0], mesh[1]
 
@@ -57,7 +49,6 @@ EDGES = {
     "tube": (lambda: SURFACES["cylinder outside"].mesh(0.6), "both", 30),
     "cap": (open_cap, "both", 30),
     "wave": (lambda: SURFACES["wavy above"].mesh(0.6), "both", 30),
-    "gutter": (gutter, "both", 30),
     "sheet": (lambda: meshes.grid_plate(3, 3, size=4.0), "both", 30),
     "l plate": (lambda: larger(meshes.l_plate(2)), "both", 30),
     "cube": (lambda: meshes.cube(4.0), "outside", 30),
@@ -76,7 +67,7 @@ def edged(kind: str, exact: bool = True) -> Shell:
 
 
 def deepest(shell, center) -> float:
-    return query(shell, center).depth.max(initial=0.0)
+    return sweeps.query(shell, center).depth.max(initial=0.0)
 
 
 def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0.3):
@@ -104,7 +95,7 @@ def along_edges(shell, depth: float, count: int, seed: int = 0, reach: float = 0
             yield path
 
 
-CURVED = list(EDGES)[:8]
+CURVED = list(EDGES)[:7]
 EDGED = [(kind, exact) for kind in EDGES for exact in (True, False) if kind in CURVED or not exact]
 SOME_EDGED = {("can", True), ("wave", True), ("tube", True)}
 SOME_EDGED |= {(kind, False) for kind in ("can", "cup", "lens", "sheet", "box", "cone")}
@@ -134,7 +125,7 @@ def star(kind: str, facets: int, slope: float):
 def lowered(shell, center, depth: float):
     """The centre moved up or down until its deepest contact has the given depth."""
     for _ in range(12):
-        found = query(shell, center)
+        found = sweeps.query(shell, center)
         lift = (found.depth[0] - depth) / found.normal[0, 2] if len(found) else -0.05
         center = center + lift * sweeps.UP
         if 0 <= abs(lift) < 1e-9:
@@ -164,7 +155,6 @@ STARS = [
 ]
 SOME_STARS = {("tip", 3, 10), ("tip", 12, 40), ("pit", 6, 2), ("pit", 12, 40)}
 SOME_STARS |= {("saddle", 4, 2), ("saddle", 6, 40)}
-SMOOTH_STARS = mostly_studies((s for s in STARS if s[2] <= 10), SOME_STARS.__contains__)
 STARS = mostly_studies(STARS, SOME_STARS.__contains__)
 
 
@@ -194,19 +184,3 @@ def test_vertices(kind: str, facets: int, slope: float) -> None:
         else:
             sweeps.assert_continuous(shell, paths, depth)
         sweeps.assert_as_defined(shell, [path[k] for path in paths for k in (3, 6)], depth)
-
-
-@pytest.mark.parametrize(("kind", "facets", "slope"), SMOOTH_STARS)
-def test_vertices_that_count_as_smooth(kind: str, facets: int, slope: float) -> None:
-    """The same flat facets with their own normals and the crease angle of 30 degrees: the potential
-    does not jump, nor, but in pits, the force."""
-    vertices, triangles = star(kind, facets, slope)
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    normals /= np.linalg.norm(normals, axis=1)[:, None]
-    shell = Shell(vertices, triangles, normals=np.repeat(normals[:, None], 3, axis=1))
-    for depth in sweeps.DEPTHS:
-        for path in over_vertex(shell, depth):
-            pairs = sweeps.sweep(shell, path)
-            change = sweeps.changes(shell, pairs, depth)[:, 1 if kind == "pit" else 0]
-            assert change.max() <= sweeps.LIMIT, (change.max(), pairs[change.argmax()][0].tolist())

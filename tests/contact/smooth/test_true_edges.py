@@ -42,7 +42,6 @@ def test_cone_tip(slope: float, rings: int) -> None:
 
 POLYHEDRA = {
     "cube": (meshes.cube(), None),
-    "cube of quads": (meshes.cube(quads=True), None),
     "sheet": (meshes.grid_plate(3, 5), None),
     "tetrahedron": (tetrahedron(0.9), None),
     "icosahedron": (meshes.icosphere(0), None),
@@ -51,9 +50,7 @@ POLYHEDRA = {
     "crumpled": (meshes.crumpled(5, seed=2), 0.0),
     "icosphere": (meshes.icosphere(2), 0.0),
     "needles": (meshes.needles(aspect=100.0), 0.0),
-    "bowl": (meshes.bowl(6), 0.0),
     "groove": (meshes.v_groove(0.1, cells=3), 0.0),
-    "steep groove": (meshes.v_groove(0.6, cells=3), None),
     "ridge": (meshes.v_groove(-1.2, cells=3), None),
 }
 
