@@ -135,6 +135,24 @@ def test_force_and_slope_are_derivatives(kind: str) -> None:
         assert np.abs(slope - turns).max() <= 3e-6 * np.abs(slope).max(), center
 
 
+def test_hole_and_thin_wall() -> None:
+    """A plate with a hole, and both faces of a thin one: V is additive, so nothing is special."""
+    vertices, elements = meshes.grid_plate(6, 6, size=4.0)
+    inner = (np.abs(vertices[elements].mean(axis=1)[:, :2]) < 0.7).all(axis=1)
+    center = np.array([0.05, 0.1, 0.9])
+    whole = total(Shell(vertices, elements), center)
+    ring = total(Shell(vertices, elements[~inner]), center)
+    plug = total(Shell(vertices, elements[inner]), center)
+    for all_, part, rest in zip(whole, ring, plug, strict=True):
+        assert part + rest == pytest.approx(all_, abs=1e-9 * np.abs(all_).max())
+    vertices, elements = meshes.cube(4.0)
+    thin = Shell(vertices * [1.0, 1.0, 0.0125], elements, side="outside")
+    force, energy, _ = total(thin, [0.0, 0.0, 0.025 + 0.8])
+    exact = plane_force(1.0, 0.2) - plane_force(1.0, 0.15)
+    assert force[2] == pytest.approx(exact, rel=1e-12)
+    assert energy > 0
+
+
 @pytest.mark.parametrize(("kind", "center"), [("dome", [1.0, 2.0, 4.3]), ("cube", [2.3, 2.2, 2.6])])
 def test_points_add_up(kind: str, center: list[float]) -> None:
     """Forces of the quadrature points, their patches' and the whole."""

@@ -17,7 +17,7 @@ from sphshell_pin.scenario import build, run_built
 from sphshell_pin.scenario.running.replay import Replay
 from sphshell_pin.testing import assert_derivatives
 from tests import models
-from tests.contact.test_table_law import LAW_LINE
+from tests.contact.test_table_law import LAW_LINE, SPRING, TABLE
 from tests.scenario.files import DROP, write
 
 FORCE = ctypes.CFUNCTYPE(
@@ -142,6 +142,26 @@ def test_derivatives_are_those_of_the_twin(own, twin, moves) -> None:
     for name in ("by_q", "by_v", "by_parameters"):
         a, b = getattr(found, name), getattr(exact, name)
         np.testing.assert_allclose(a, b, rtol=0, atol=1e-7 * np.abs(b).max())
+
+
+@pytest.mark.parametrize(
+    ("own", "twin", "error"),
+    [
+        ((C_LAW, None), (TWIN, None), 1e-9),
+        ((TABLE, None), (SPRING, None), 1e-6),
+        ((TWIN, OWN), (TWIN, SMOOTH), 1e-8),
+    ],
+)
+def test_a_run_is_that_of_the_twin_and_keeps_its_energy(own, twin, error) -> None:
+    ours, theirs = (
+        sp.Simulation(models.on_plate(models.ball(), *one), sp.Adaptive(1e-10)).run(
+            BALL, MOVES, 0.2, record_dt=1e-3
+        )
+        for one in (own, twin)
+    )
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=error)
+    assert np.abs(ours.energy.residual).max() < 1e-8
+    assert (ours.energy.friction_loss[-1] > 1e-4) == (own[1] is not None)
 
 
 @pytest.mark.parametrize("make", [lambda: C_LAW, python_law], ids=["C", "python"])

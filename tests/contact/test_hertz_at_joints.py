@@ -109,3 +109,18 @@ def test_derivatives_are_those_of_differences(beyond: float) -> None:
     assert_derivatives(one, at, np.zeros(3), tolerance=1e-5)
     (by_q,) = one.contact_force_derivatives(at, np.zeros(3)).by_q
     assert np.abs(by_q - by_q.T).max() < 1e-5 * np.abs(by_q).max()  # the force is a gradient
+
+
+@pytest.mark.parametrize("faces", [True, False])
+def test_a_ball_that_slides_over_joints_keeps_its_energy(faces: bool) -> None:
+    law = sp.HertzLaw(1e6, 0.4)
+    depth = law.on_plane(RADIUS).depth_at(0.05 * 9.81)
+    residuals = []
+    for one in (law, law.on_plane(RADIUS)):
+        several = scene(one, halfpipe(faces=faces), 9.81)
+        start = np.array([0.0, 0.002, RADIUS - depth])
+        run = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11)).run(
+            start, np.array([0.25, 0.0, 0.0]), 1.0
+        )
+        residuals.append(np.abs(run.energy.residual).max() / run.energy.kinetic[0])
+    assert residuals[0] < 5 * residuals[1] + 1e-6

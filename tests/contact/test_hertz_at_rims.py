@@ -125,3 +125,17 @@ def test_derivatives_hold_at_the_tip_of_a_cone(off):
             center = place + (RADIUS - 1e-4) * normal
             assert len(several.contacts(center).depth) == 1
             assert_derivatives(several, center, np.zeros(3), tolerance=1e-5)
+
+
+def test_the_energy_does_not_jump_from_the_side_of_a_cone_to_its_tip():
+    half_angle, several = np.arctan(0.3), scene(SHELLS["cone"]())
+    simulation = sp.Simulation(several, sp.SemiImplicitEuler(1e-12))
+    tip, slope = np.array([0, 0, 0.05]), np.array([np.cos(half_angle), 0, np.sin(half_angle)])
+    energies, forces = [], []
+    for off in np.linspace(-1e-6, 1e-6, 9):
+        # Along the side through the cone's plane, and on round the tip.
+        center = tip + (RADIUS - 1e-4) * slope + off * np.array([slope[2], 0, -slope[0]])
+        energies.append(simulation.run(center, np.zeros(3), 1e-12).energy.elastic[0])
+        forces.append(several.external_forces(center, np.zeros(3))[1].linear)
+    assert np.ptp(energies) < 3e-3 * max(energies)
+    assert np.abs(np.diff(forces, axis=0)).max() < 3e-3 * np.abs(forces).max()

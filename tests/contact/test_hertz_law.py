@@ -144,6 +144,21 @@ def test_two_balls_are_hertz_on_both_radii() -> None:
     assert np.isclose(force[2], expected.normal_force(1e-3), rtol=1e-12)
 
 
+@pytest.mark.parametrize("name", ["saddle of a torus", "ellipsoid"])
+def test_energy_closes_where_the_curvature_changes_along_the_path(name) -> None:
+    surface = SURFACES[name]
+    x, n = surface.middle()
+    along = np.cross(n, [0.3, 0.2, 1.0])
+    scene = ball_scene(surface.shell(), 0.3, LAW, gravity=-50 * n)
+    start = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
+    speed = np.array([*(1.5 * along / np.linalg.norm(along)), 0, 0, 0])
+    result = sp.Simulation(scene, sp.Adaptive(rtol=1e-10, atol=1e-12)).run(start, speed, 0.1)
+    energy = result.energy
+    total = energy.kinetic + energy.potential + energy.elastic
+    assert len(result.contacts) > 100
+    assert np.ptp(total) < 1e-6 * np.ptp(energy.elastic)
+
+
 @pytest.mark.parametrize("restitution", [0.5, 0.9])
 def test_restitution_is_that_stated(restitution) -> None:
     surface = SURFACES["ellipsoid"]

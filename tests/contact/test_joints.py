@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.shell.curvature import curved_mesh
 from sphshell_pin.shell.raw import random_places
 from tests.contact.test_faces import VALVE_BODY
+from tests.joints.boxes import BOXES
 from tests.joints.solids import write_step
 from tests.parts import occ
 
@@ -94,6 +96,17 @@ def test_a_plane_is_flat_however_far_off_it_its_vertices_are(folder):
             place -= (place - face.point) @ face.axis * face.axis
             force = shell.contacts(place + (ball - depth) * face.axis, ball).force(law)
             assert np.linalg.norm(force) == pytest.approx(depth**1.5, rel=1e-9)
+
+
+def test_where_cylinders_end_in_planes_the_planes_stay_flat(folder):
+    """Borders are moved onto both faces at once; a plane has the last word."""
+    shell = sp.Shell.from_file(step_of(BOXES["mitre"](np.random.default_rng(0)), folder))
+    points, _, _ = curved_mesh(shell, 3)
+    points = points.reshape(len(shell.triangles), -1, 3)
+    for face in shell.faces:
+        if face.kind == "plane":
+            off = (points[np.isin(shell.triangle_element, face.elements)] - face.point) @ face.axis
+            assert np.abs(off).max() <= 1e-14 * shell.size
 
 
 def test_a_border_that_runs_through_the_facet_beside_its_own():

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sphshell_pin import CoulombFriction, HuntCrossleyLaw, ImpactLaw
 from tests.oracle import laws as oracle
+from tests.validation.restitution import hunt_crossley_restitution
 
 MM = 1e-3
 DEFAULTS = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
@@ -96,6 +97,17 @@ def test_hertz_of_two_materials() -> None:
     assert law.stiffness == pytest.approx(4 / 3 / inverse * 0.1, rel=1e-14)
     damped = ImpactLaw.hertz(0.01, 207e9, 0.29, 3e9, 0.4, restitution=0.7, speed=0.3)
     assert damped == HuntCrossleyLaw.with_restitution(law.stiffness, 1.5, 0.7, 0.3)
+
+
+@pytest.mark.parametrize("restitution", [0.05, 0.3, 0.7, 0.95, 0.999])
+@pytest.mark.parametrize("speed", [0.01, 0.3, 5.0])
+def test_hertz_with_restitution(restitution: float, speed: float) -> None:
+    """d v0 - ln(1 + d v0) = -d v1 - ln(1 - d v1), v1 = restitution v0."""
+    law = ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, restitution=restitution, speed=speed)
+    assert isinstance(law, HuntCrossleyLaw)
+    assert law.exponent == 1.5
+    got = hunt_crossley_restitution(speed, law.dissipation)
+    assert got == pytest.approx(restitution, abs=1e-8)
 
 
 @pytest.mark.parametrize("restitution", [0.5, 0.9, 0.93, 0.99, 0.99999, 1 - 1e-7, 1 - 1e-14])

@@ -168,6 +168,32 @@ def test_bristles_of_a_source_hold_whatever_its_frames(turn) -> None:
     assert rows.q[-1, :2] == pytest.approx([2e-5, 1e-5], rel=1e-3)
 
 
+def zoo() -> sp.Scene:
+    """Free flyer on a chain of a planar, a spherical and a composite joint; the tip touches."""
+    model, parent = models.empty(), 0
+    lump = pin.Inertia(1.0, np.array([0.02, 0.01, 0.03]), np.diag([0.02, 0.03, 0.04]))
+    out = pin.SE3(np.eye(3), np.array([0.05, 0.02, 0.1]))
+    mixed = pin.JointModelComposite(pin.JointModelRX())
+    mixed.addJoint(pin.JointModelRUBY(), pin.SE3(np.eye(3), np.array([0.0, 0.03, 0.0])))
+    kinds = pin.JointModelFreeFlyer(), pin.JointModelPlanar(), pin.JointModelSpherical(), mixed
+    for name, joint in zip(("a", "b", "c", "ball"), kinds, strict=True):
+        parent = models.add_body(model, name, joint, parent, placement=out, inertia=lump)
+    return models.on_shell(model, models.square(20), models.linear_law(1e4, 20.0), BRISTLE)
+
+
+def test_all_kinds_of_joints_agree() -> None:
+    scene, rng = zoo(), np.random.default_rng(3)
+    q = pin.integrate(scene.model, pin.neutral(scene.model), rng.uniform(-0.4, 0.4, scene.model.nv))
+    q[2] += R - 2e-3 - models.pose_of(scene.model, q, "ball").translation[2]
+    v = rng.uniform(-2.0, 2.0, scene.model.nv)
+    explicit = run(scene, sp.Adaptive(1e-11), q, v, 0.1)
+    implicit = run(scene, sp.Implicit(1e-9), q, v, 0.1)
+    assert len(explicit.contacts.depth) > 10
+    apart = pin.difference(scene.model, explicit.q[-1], implicit.q[-1])
+    assert np.abs(apart).max() < 1e-7
+    assert np.abs(explicit.energy.residual).max() < 1e-7 * explicit.energy.exchanged
+
+
 @both
 def test_a_start_in_touch_and_at_rest(integrator) -> None:
     q = models.free_q([0.0, 0.0, R - 9.81 / 4000.0])

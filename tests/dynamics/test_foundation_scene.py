@@ -91,6 +91,18 @@ def drop(scene, q, v, duration, **options):
     return sp.Simulation(scene, integrator).run(q, v, duration)
 
 
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+def test_energy_over_a_crease(method: str) -> None:
+    """Sliding over the edge of a block, and over the border of a sheet."""
+    for shell in (edged("cube"), edged("sheet")):
+        height = 2.0 if shell.side == "outside" else 0.0
+        scene = free_ball(shell, LAW, gravity=9.81, method=method)
+        q = free_q([1.2, 0.3, height + 0.95])
+        result = drop(scene, q, np.array([1.5, 0.1, 0, 0, 0, 0]), 0.8)
+        assert result.q[-1, 0] > 2.2
+        assert np.abs(result.energy.residual).max() <= 1e-6 * np.ptp(result.energy.kinetic)
+
+
 def test_energy_with_friction() -> None:
     """What damping and friction take is what is missing."""
     scene = free_ball(edged("cube"), DAMPED, COULOMB, gravity=9.81)

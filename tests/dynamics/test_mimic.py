@@ -30,6 +30,17 @@ def panda() -> tuple[pin.Model, pin.Model]:
     return tuple(pin.buildModelFromUrdf(path, mimic=mimic) for mimic in (True, False))  # type: ignore[return-value]
 
 
+def reduction(model: pin.Model, full: pin.Model) -> tuple[Array, Array]:
+    """Return G (nv of full, nv) and the offsets of q = G q_reduced + offset."""
+    matrix, offset = np.zeros((full.nv, model.nv)), np.zeros(full.nq)
+    for joint, free in zip(model.joints[1:], full.joints[1:], strict=True):
+        ratio = 1.0
+        if joint.shortname() == "JointModelMimic":
+            ratio, offset[free.idx_q] = joint.extract().scaling, joint.extract().offset
+        matrix[free.idx_v, joint.idx_v] = ratio
+    return matrix, offset
+
+
 def with_contact(model: pin.Model, tip: str, other: str) -> sp.Scene:
     """A sphere on one finger against a shell on the other, which always touch."""
     scene = sp.Scene(model)
@@ -47,6 +58,38 @@ CASES = {
     "panda": (panda, "panda_leftfinger", "panda_rightfinger"),
     "gripper": (gripper, "left_pad", "right_pad"),
 }
+
+
+@pytest.mark.parametrize("integrator", [sp.Adaptive(1e-8, 1e-10), sp.Implicit(1e-7, 1e-9)])
+def test_a_closing_grasp_keeps_its_energy(integrator: sp.Adaptive | sp.Implicit) -> None:
+    model, full = gripper()
+    scene = sp.Scene(model)
+    box = sp.Shell(*meshes.cube(0.02))
+    # The right finger, of the smaller ratio, reaches less far.
+    for side, radius in (("left", 0.006), ("right", 0.0095)):
+        scene.add_contact(
+            sp.Sphere(radius, frame=f"{side}_pad", offset=(0.0, 0.0, 0.02)),
+            box,
+            placement=pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.078])),
+            law=sp.HuntCrossleyLaw(1e6, 1.5, 0.5),
+            friction=sp.CoulombFriction(0.5, 0.4, 0.01, 0.1),
+            name=side,
+        )
+    control = sp.JointPD(
+        {"left_knuckle_joint": 2.0, "lift": 500.0}, 0.02, {"left_knuckle_joint": 0.9}
+    )
+    result = sp.Simulation(scene, integrator).run(np.zeros(model.nq), None, 0.5, control)
+    figures = result.stats.pairs
+    assert figures["left"].touches
+    assert figures["right"].touches
+    assert np.abs(result.energy.residual).max() < 1e-5 * result.energy.exchanged
+    # Both pads stay where their ratio has them.
+    matrix, offset = reduction(model, full)
+    data, free = model.createData(), full.createData()
+    pin.forwardKinematics(model, data, result.q[-1])
+    pin.forwardKinematics(full, free, matrix @ result.q[-1] + offset)
+    for ours, theirs in zip(data.oMi, free.oMi, strict=True):
+        assert ours.isApprox(theirs, 1e-12)
 
 
 def test_joint_components_act_on_the_joint_that_is_mimicked() -> None:

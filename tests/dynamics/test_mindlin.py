@@ -7,8 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.integrate import solve_ivp
 
 import sphshell_pin as sp
+from sphshell_pin import _core
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from tests import meshes, models
 
@@ -165,6 +167,22 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.3)
 
 
+@models.every_integrator(1e-4, 1e-6, 1e-5)
+def test_nothing_creeps_on_a_slope(integrator) -> None:  # type: ignore[no-untyped-def]
+    angle = math.radians(10)
+    law = sp.ImpactLaw.hertz(0.05, *SOFT, *SOFT, restitution=0.1, speed=0.1)
+    friction = sp.MindlinFriction(0.5, 0.4, *SOFT, damping_time=0.01)
+    scene = models.on_plate(models.block(tilt=angle), law, friction)
+    start = [0.0, 0.0, 0.05 - law.depth_at(9.81 * math.cos(angle))]
+    run = sp.Simulation(scene, integrator).run(start, duration=4.0, record_dt=1.0)
+    assert np.abs(run.v[-1]).max() < 1e-8
+    force = run.contacts.friction_force_world[-1]
+    assert force[0] == pytest.approx(-9.81 * math.sin(angle), rel=1e-5)
+    depth = law.depth_at(9.81 * math.cos(angle))
+    stretch = 9.81 * math.sin(angle) / friction.tangential_stiffness(math.sqrt(0.05 * depth))
+    assert run.q[-1, 0] == pytest.approx(stretch, rel=1e-3)
+
+
 @pytest.mark.parametrize("rings", [1, 4])
 def test_a_spin_dies_out_at_the_moment_limit(rings: int) -> None:
     """M = 3 pi / 16 mu N a."""
@@ -262,3 +280,55 @@ def test_contacts_that_split_and_merge_share_one_bristle() -> None:
         assert found.friction_force_world[:, 1] == pytest.approx(held, rel=1e-3)
     assert counts[0] == counts[-1] == 1
     assert counts.count(3) > 20
+
+
+class Path:
+    """Force, moment and work along a motion of one contact, by the law's own rates."""
+
+    def __init__(self, friction: sp.MindlinFriction) -> None:
+        self.friction = friction
+
+    def at(self, z, depth: float, closing: float, slip, spin: float):  # type: ignore[no-untyped-def]
+        velocity = np.array([*slip, -closing])
+        law, friction = LAW._binding, self.friction._binding
+        rest = np.zeros(3)
+        return _core.contact_force(law, friction, depth, UP, velocity, spin, rest, z, R, 1e-5)
+
+    def run(self, times, depth, slip, spin):  # type: ignore[no-untyped-def]
+        """Work (n,) of friction on what moves the bodies; functions of time give value and rate."""
+
+        def rate(t: float, y):  # type: ignore[no-untyped-def]
+            value, closing = depth(t)
+            _, drag, moment, z_rate = self.at(y[:3], value, closing, slip(t), spin(t))
+            return [*z_rate, drag[:2] @ slip(t) + moment[2] * spin(t)]
+
+        out = [np.zeros(4)]
+        for begin, end in pairwise(times):
+            step = solve_ivp(rate, (begin, end), out[-1], rtol=1e-9, atol=1e-16, method="LSODA")
+            assert step.success
+            out.append(step.y[:, -1])
+        return np.array(out)
+
+
+def test_cycle_of_elata_and_berryman() -> None:
+    """Slip at a high load, back at a low one: incremental laws gain (k_1 - k_2) s^2 / 2.
+
+    Here the force falls with the load, and that energy is lost.
+    """
+    high, low, shift = 4e-4, 1e-4, 1e-6
+    depths = [high, high, low, low, high]
+    slips = [0.0, shift, shift, 0.0, 0.0]
+
+    def leg(values: list[float], t: float) -> tuple[float, float]:
+        k = min(int(t), 3)
+        return values[k] + (t - k) * (values[k + 1] - values[k]), values[k + 1] - values[k]
+
+    path = Path(STICKS)
+    rows = path.run(
+        range(5), lambda t: leg(depths, t), lambda t: [leg(slips, t)[1], 0.0], lambda t: 0.0
+    )
+    k_1, k_2 = (STICKS.tangential_stiffness(disc(d)) for d in (high, low))
+    assert rows[1, 3] == pytest.approx(-k_1 * shift**2 / 2, rel=1e-6)
+    assert rows[3, 3] == pytest.approx(-(k_1 - k_2) * shift**2 / 2, rel=1e-6)
+    # Back at the start nothing is left: the force that the bodies took apart is gone.
+    assert np.abs(rows[-1, :3]).max() < 1e-6 * np.abs(rows[1, :3]).max()

@@ -4,6 +4,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import brentq, curve_fit
 from scipy.spatial import ConvexHull
 
 import sphshell_pin as sp
@@ -270,3 +271,51 @@ def test_a_cylinder_that_rolls_is_slowed_by_the_dissipation() -> None:
     rate = -np.polyfit(result.t[late], np.log(np.abs(result.v[late, 5])), 1)[0]
     expected = b * 9.81 * (2 * radius * depth / 5) / (1.5 * radius**2)
     assert rate == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize(("power", "exponent"), [(-2.0, 1 / 3), (-0.5, 2 / 3), (0.6, 5 / 2)])
+def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: float) -> None:
+    """The tilt of Euler's disk is a (1 - t / end)^exponent: its energy is 3/2 m g radius tilt.
+
+    A loss as tilt^-2, of the air below it: Moffatt, Nature 404 (2000) 833; as its speed of rolling,
+    tilt^-1/2: Easwar, Rouyer and Menon, Phys. Rev. E 66 (2002) 045102. It acts as a moment against
+    the rotation; what is measured is that the contact adds no loss of its own. Last that of the law
+    alone, b N mean(gap rate^2): the disc is depth / tilt wide and sqrt(depth / tilt) long where it
+    touches, so that the volume gives tilt^(3/5).
+    """
+    own = power > 0
+    radius, thickness, mass, tilt, end = 0.04, 0.001, 0.2, 0.1, 0.6
+    shell = sp.Shell.from_geometry(coal.Cylinder(radius, thickness), segments=48)
+    inertia = pin.Inertia.FromCylinder(mass, radius, thickness)
+    friction = sp.CoulombFriction(0.02, 0.02, 0.01, 0.1)
+    law = sp.FoundationLaw(1e7, 1e-3, 10.0) if own else sp.FoundationLaw(1e8, 1e-3)
+    scene = thrown(shell, inertia, law, friction)
+    turn = pin.Quaternion(pin.utils.rotate("y", tilt)).coeffs()
+    touch = radius * np.sin(tilt) + thickness / 2 * np.cos(tilt)
+
+    def lift(z: float) -> float:
+        return scene.contacts(np.r_[0, 0, z, turn]).normal_force.sum() - mass * 9.81
+
+    q = np.r_[0, 0, brentq(lift, 0.9 * touch, touch - 1e-7), turn]
+    spin = np.sqrt(4 * 9.81 * np.sin(tilt) / radius)  # about the diameter through the contact
+    loss = exponent * 1.5 * mass * 9.81 * radius * tilt / end  # [W], at first
+
+    def tilt_of(q: np.ndarray) -> float:
+        return float(np.linalg.norm(pin.Quaternion(q[3:7]).matrix()[2, :2]))
+
+    def moment(_t, q, v, _contacts) -> np.ndarray:
+        return np.r_[0, 0, 0, -loss * (tilt_of(q) / tilt) ** power * v[3:] / (v[3:] @ v[3:])]
+
+    duration, more = end * (1 - 0.35 ** (1 / exponent)), {"controller": moment, "control_dt": 5e-4}
+    if own:
+        duration, more = 1.1, {}
+    result = run(scene, sp.Adaptive(1e-5, 1e-8), q, [0, 0, 0, -spin, 0, 0], duration, **more)
+    tilts = [tilt_of(one) for one in result.q]
+
+    def expected(t, a, b, c):
+        return a * np.maximum(1 - t / b, 1e-9) ** c
+
+    guess = tilt, 2.0 if own else end, exponent
+    fitted = curve_fit(expected, result.t, tilts, guess)[0]
+    assert fitted[2] == pytest.approx(exponent, rel=0.05 if own else 0.03)
+    assert own or fitted[1] == pytest.approx(end, rel=0.02)

@@ -77,6 +77,14 @@ def test_the_shortest_time_is_that_of_the_law_or_of_the_friction(law: str, frict
         assert found == pytest.approx(min(times), rel=1e-9)
 
 
+def test_a_ball_that_rolls_resists_a_slip_with_two_sevenths_of_its_mass() -> None:
+    law, friction = sp.ImpactLaw(1e7, 1.0), FRICTIONS["coulomb"]
+    ball = models.on_plate(models.ball(mass=MASS), law, friction)
+    q = models.free_q([0.0, 0.0, RADIUS - law.depth_at(MASS * 9.81)])
+    expected = friction.slip_time(2 / 7 * MASS, MASS * 9.81, 1.0)
+    assert shortest(ball, q, [0.0] * 6) == pytest.approx(expected, rel=1e-3)
+
+
 @laws
 def test_the_recommended_step_resolves_an_impact(law: str) -> None:
     one = (ELASTIC | DAMPED)[law]

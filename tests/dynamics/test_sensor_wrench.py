@@ -5,6 +5,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from tests import models, urdf
 from tests.texts import DATA, text_of
@@ -220,6 +221,21 @@ def test_what_a_joint_adds_is_transmitted():
     assert result.stats.joints[joint].cut_time > 0.19
 
 
+def test_joints_that_mimic_others():
+    """A gripper's finger hangs on a joint that follows: its weight counts, it has no motor."""
+    model = robots.load("panda", mimic=True).model
+    finger = model.names[model.njoints - 1]
+    q = np.array([0.3, 0.2, -0.4, -1.5, 0.3, 1.2, 0.5, *([0.02] * (model.nq - 7))])
+    force = rest(sp.Scene(model), q, sensor("panda_hand"))[:3]
+    hand = model.frames[model.getFrameId("panda_hand_joint")].inertia.mass
+    mass = hand + sum(model.inertias[k].mass for k in (model.njoints - 2, model.njoints - 1))
+    turn = models.pose_of(model, q, "panda_hand").rotation
+    assert np.allclose(turn @ force, [0, 0, 9.81 * mass], rtol=0, atol=1e-10)
+    follower = sp.JointTorqueSensor(name="s", joint=finger)
+    with pytest.raises(sp.SphshellError, match="it follows another joint, measure that one"):
+        read(sp.Scene(model), q, None, [follower])
+
+
 def test_the_drive_of_joints_that_follow_carries_them():
     """A slide of 1 kg, and one of 0.5 kg that goes up twice as far."""
     model = pin.buildModelFromXML(text_of("robots/two_slides.urdf"), mimic=True)
@@ -246,6 +262,21 @@ def test_bodies_of_an_mjcf_file(frame, mass):
     assert np.allclose(found, [0, 0, 9.81 * mass, 0, 0, 0], rtol=0, atol=1e-10)
     with pytest.raises(sp.SphshellError, match="'s' is a point on a link"):
         read(scene, pin.neutral(model), None, [sensor("s")])
+
+
+@pytest.mark.parametrize("lock", [(), ("r/knuckle",), ("shoulder",)])
+def test_robots_that_were_joined(lock):
+    two = arm()
+    for k, frame in enumerate(two.frames):
+        two.frames[k].name = f"r/{frame.name}"
+    for k in range(1, two.njoints):
+        two.names[k] = f"r/{two.names[k]}"
+    both = pin.appendModel(arm(), two, 0, pin.SE3(np.eye(3), np.array([0.0, 1.0, 0.0])))
+    q = np.array([0.4, -0.7, 0.2, 0.9])
+    left = q[[name not in lock for name in list(both.names)[1:]]]
+    scene = sp.Scene(both, lock=lock, q_lock=q if lock else None)
+    for frame, posture in (("mount", q[:2]), ("r/mount", q[2:])):
+        assert np.abs(rest(scene, left, sensor(frame)) - weight(arm(), posture)).max() < 1e-10
 
 
 def test_nothing_holds_a_floating_base():

@@ -1,5 +1,6 @@
 """Flat faces and lines beside a plane under laws of a point: potential, derivatives, rest."""
 
+import itertools
 import warnings
 
 import coal
@@ -84,6 +85,31 @@ def test_derivatives_are_those_of_finite_differences(name: str, friction, ground
     assert_rows(scene, q, v)
     if not ground:
         testing.assert_wrenches_cancel(scene, q, v)
+
+
+@pytest.mark.parametrize("name", SHELLS)
+def test_the_force_is_the_gradient_of_a_potential(name: str) -> None:
+    """Round closed ways through states that lie flat, on edges and on corners."""
+    law = sp.ImpactLaw(1e6, 1.5)
+    rng = np.random.default_rng(1)
+    for tilt in (0.3, 1.0):
+        scene, q, _ = lying(name, law, None, tilt=0.0)
+        model = scene.model
+        ways = rng.normal(size=(2, 6)) * np.r_[[1e-5] * 3, [tilt / CROWN] * 3]
+        turns, weights = np.polynomial.legendre.leggauss(12)
+        parts = np.linspace(0, 2 * np.pi, 61)
+        total = size = 0.0
+        for begin, end in itertools.pairwise(parts):
+            for x, share in zip(turns, weights, strict=True):
+                angle = (begin + end) / 2 + (end - begin) / 2 * x
+                at = np.cos(angle) * ways[0] + np.sin(angle) * ways[1]
+                along = -np.sin(angle) * ways[0] + np.cos(angle) * ways[1]
+                here = pin.integrate(model, q, at)
+                rate = pin.dIntegrate(model, q, at)[1] @ along
+                force = scene.external_forces(here, np.zeros(6))[1].vector
+                total += share * (end - begin) / 2 * force @ rate
+                size += share * (end - begin) / 2 * abs(force @ rate)
+        assert abs(total) < 1e-5 * size  # kinks within the rule
 
 
 def enclosing(points: np.ndarray) -> tuple[np.ndarray, float]:
