@@ -66,9 +66,7 @@ static void bind(nb::class_<T>& bound) {
               StepSlopes slopes(scene, std::move(parameters));
               HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
               const State& end = step.take();
-              const Tangent tangent = step.derivatives(slopes);
-              MatrixX by(2 * nv, tangent.q.cols());
-              by << tangent.q, tangent.v;
+              const MatrixX by = step.derivatives(slopes).topRows(2 * nv);
               return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
                                     read_only_array(by.middleCols(first, 2 * nv)),
                                     read_only_array(by.rightCols(nv)),

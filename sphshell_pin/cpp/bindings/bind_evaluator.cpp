@@ -114,9 +114,9 @@ void differentiate_step_into(Evaluations& self, const std::string& integrator, d
     HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
     sum_slopes(slopes.linearization(), scene, q, v, forces_by_state);
     step.take();
-    const Tangent tangent = step.derivatives(slopes);
-    by_state << tangent.q.leftCols(2 * nv), tangent.v.leftCols(2 * nv);
-    by_tau << tangent.q.rightCols(nv), tangent.v.rightCols(nv);
+    const MatrixX by = step.derivatives(slopes).topRows(2 * nv);
+    by_state = by.leftCols(2 * nv);
+    by_tau = by.rightCols(nv);
   });
 }
 

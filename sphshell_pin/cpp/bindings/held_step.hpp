@@ -36,15 +36,12 @@ class HeldStep {
     return end_;
   }
   // Of the end, after take(): by the parameters of `slopes`, q, v and the torques, in columns.
-  Tangent derivatives(StepSlopes& slopes) {
-    const Eigen::Index nv = start_.v.size(),
-                       first = Eigen::Index(slopes.linearization().parameters().size()),
-                       all = first + 3 * nv;
-    Tangent out{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
-                MatrixX::Zero(start_.z.size(), all)};
-    MatrixX torque = MatrixX::Zero(nv, all);
-    out.q.middleCols(first, nv).setIdentity();
-    out.v.middleCols(first + nv, nv).setIdentity();
+  MatrixX derivatives(StepSlopes& slopes) {
+    const auto nv = start_.v.size();
+    const auto first = Eigen::Index(slopes.linearization().parameters().size());
+    MatrixX out = MatrixX::Zero(2 * nv + start_.z.size(), first + 3 * nv);
+    MatrixX torque = MatrixX::Zero(nv, out.cols());
+    out.block(0, first, 2 * nv, 2 * nv).setIdentity();
     torque.rightCols(nv).setIdentity();
     slopes.carry(chart_, *stepper_, dt_, torque, out);
     return out;

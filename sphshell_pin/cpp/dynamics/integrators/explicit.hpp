@@ -13,7 +13,7 @@ class SemiImplicitEuler : public Stepper {
   static constexpr const char* kind = "semi-implicit-euler";  // in files
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
   bool leaves_work() const override { return true; }
 };
 
@@ -22,7 +22,7 @@ class ExplicitRungeKutta : public Stepper {
  public:
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
 
  protected:
   struct Row {
@@ -53,8 +53,8 @@ class DormandPrince : public ExplicitRungeKutta {
   static constexpr const char* kind = "adaptive";  // in files
   DormandPrince();
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
-    carry_along(slopes, chart, h, tangent);
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override {
+    carry_along(slopes, chart, h, changes);
   }
   int order_of_error() const override { return 5; }
   void interpolate(double theta, VectorX& y) const override;

@@ -45,7 +45,7 @@ class LinearlyImplicitEuler : public ImplicitStepper {
   static constexpr const char* kind = "linearly-implicit-euler";  // in files
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
   bool leaves_work() const override { return true; }
 };
 
@@ -57,8 +57,8 @@ class Rodas : public ImplicitStepper {
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
   void complete(Chart& chart, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
-    carry_along(slopes, chart, h, tangent);
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override {
+    carry_along(slopes, chart, h, changes);
   }
   int order_of_error() const override { return 4; }
   void interpolate(double theta, VectorX& y) const override;
