@@ -13,8 +13,7 @@ void ImplicitStepper::begin(Chart& chart) {
   nv_ = chart.nv();
   nz_ = chart.nz();
   const int n = 2 * nv_ + nz_;
-  chart.start(start_);
-  chart.rate_at_origin(rate_);
+  Stepper::begin(chart);
   const State& from = chart.origin();
   torque_ = chart.torque_at_origin();
   linearization_.rates(from.q, from.v, from.z, torque_, rates_);

@@ -15,7 +15,10 @@ class Stepper {
   virtual ~Stepper() = default;
 
   // Moves on from the chart's origin by h. step() may be repeated with another h.
-  virtual void begin(Chart& chart) = 0;
+  virtual void begin(Chart& chart) {
+    chart.start(start_);
+    chart.rate_at_origin(rate_);
+  }
   virtual void step(Chart& chart, double h, State& out) = 0;
   // Once, after a step that is kept: what its end or its work still needs.
   virtual void complete(Chart& /*chart*/, State& /*out*/) {}
