@@ -1,28 +1,28 @@
 // A step of an integrator under held torques, and its derivatives.
 #pragma once
 
+#include "bindings/evaluations.hpp"
 #include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
 
-// From (q, v, z); the scene is left as it was.
+// The scene is left as it was.
 class HeldStep {
  public:
-  HeldStep(SceneData& scene, const std::string& integrator, double dt, const VectorX& q,
-           const VectorX& v, VectorX z, const VectorX& tau)
-      : scene_(scene),
-        before_(scene.least_relaxation()),
+  HeldStep(const At& at, const std::string& integrator, double dt, const VectorX& tau)
+      : scene_(at.scene),
+        before_(scene_.least_relaxation()),
         dt_(dt),
         torques_(tau),
-        stepper_(make_stepper(integrator, scene)),
-        chart_(scene, torques_),
-        start_{0, q, v, std::move(z), {}} {
+        stepper_(make_stepper(integrator, scene_)),
+        chart_(scene_, torques_),
+        start_{0, at.q, at.v, at.state.bristles(), {}} {
     // Explicit steps of this length hold bristles back.
-    scene.relax_in(stepper_->is_implicit() ? 0 : dt);
-    scene.restart();
+    scene_.relax_in(stepper_->is_implicit() ? 0 : dt);
+    scene_.restart();
     chart_.begin(start_);
-    scene.evaluate(q, v, start_.z, true);
+    scene_.evaluate(start_.q, start_.v, start_.z, true);
   }
   ~HeldStep() {
     scene_.restart();
