@@ -213,14 +213,8 @@ bool Simulation::make_controlled(double end) {
   // Sensors and rows within the step need its dense output, so they come before the step is
   // accepted.
   if (controller_) kink_ = controller_->next_kink(time());
-  switch (stepping_.make_controlled(end)) {
-    case Stepping::Made::Stuck:
-      return false;
-    case Stepping::Made::Nothing:
-      return true;
-    case Stepping::Made::Step:
-      break;
-  }
+  const Stepping::Made made = stepping_.make_controlled(end);
+  if (made != Stepping::Made::Step) return made == Stepping::Made::Nothing;
   made_cut_ = cut_;
   // Before the step is accepted, as the scene must still know where it began.
   if (sensitivities_) sensitivities_->step(stepping_);
