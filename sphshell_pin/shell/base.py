@@ -174,7 +174,7 @@ class ShellBase(Summarized):
     @property
     def num_edges(self) -> int:
         """Number of edges; the diagonal inside a quad is none."""
-        return int(self._binding.num_edges)
+        return len(self.edge_class)
 
     @cached_property
     def element_patch(self) -> Ints:

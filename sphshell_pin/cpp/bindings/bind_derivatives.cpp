@@ -11,64 +11,55 @@ static void bind(nb::class_<T>& bound) {
   bound
       .def(
           "dynamics_derivatives",
-          [](T& self, nb::handle given_q, nb::handle given_v, nb::handle given_tau,
-             std::vector<Parameter> parameters, int repeat) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
-            return self.at(
-                q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&& evaluate) {
-                  Linearization& linearization = evaluate.linearization();
-                  linearization.set_parameters(std::move(parameters));
-                  const VectorX z = self.bristles(scene);
-                  MatrixX jacobian;
-                  VectorX acceleration;
-                  // Repeated for timing alone.
-                  for (int i = 0; i < repeat; ++i) {
-                    evaluate();
-                    acceleration = scene.acceleration(q, v, tau);
-                    linearization.rates(q, v, z, tau, jacobian);
-                  }
-                  linearization.set_parameters({});
-                  const Eigen::Index nv = v.size();
-                  return nb::make_tuple(read_only_array(acceleration),
-                                        read_only_array(jacobian.topLeftCorner(nv, nv)),
-                                        read_only_array(jacobian.block(0, nv, nv, nv)),
-                                        read_only_array(linearization.inverse_mass()),
-                                        read_only_array(linearization.by_parameters().topRows(nv)));
-                });
+          [](T& self, nb::handle q, nb::handle v, nb::handle tau, std::vector<Parameter> parameters,
+             int repeat) {
+            return at_given(self, q, v, tau, [&](const At& at, const VectorX& tau) {
+              Linearization& linearization = at.state.linearization();
+              linearization.set_parameters(std::move(parameters));
+              MatrixX jacobian;
+              VectorX acceleration;
+              // Repeated for timing alone.
+              for (int i = 0; i < repeat; ++i) {
+                at.evaluate();
+                acceleration = at.scene.acceleration(at.q, at.v, tau);
+                linearization.rates(at.q, at.v, at.state.bristles(), tau, jacobian);
+              }
+              linearization.set_parameters({});
+              const Eigen::Index nv = at.v.size();
+              return nb::make_tuple(read_only_array(acceleration),
+                                    read_only_array(jacobian.topLeftCorner(nv, nv)),
+                                    read_only_array(jacobian.block(0, nv, nv, nv)),
+                                    read_only_array(linearization.inverse_mass()),
+                                    read_only_array(linearization.by_parameters().topRows(nv)));
+            });
           },
           "q"_a, "v"_a.none(), "tau"_a.none(), "parameters"_a, "repeat"_a = 1)
       .def(
           "contact_force_derivatives",
-          [](T& self, nb::handle given_q, nb::handle given_v, std::vector<Parameter> parameters) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-            return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
-              Linearization& linearization = evaluate.linearization();
+          [](T& self, nb::handle q, nb::handle v, std::vector<Parameter> parameters) {
+            return at_given(self, q, v, nb::none(), [&](const At& at, auto&&) {
+              Linearization& linearization = at.state.linearization();
               linearization.set_parameters(std::move(parameters));
-              evaluate();
+              at.evaluate();
               ContactForceSlopes out;
-              linearization.contact_forces(q, v, out);
+              linearization.contact_forces(at.q, at.v, out);
               linearization.set_parameters({});
-              std::vector<ContactRow> rows;
-              scene.log(q, v, rows);
-              return nb::make_tuple(to_bytes(std::move(rows)), read_only_array(out.force_world),
+              return nb::make_tuple(to_bytes(at.rows()), read_only_array(out.force_world),
                                     read_only_array(out.normal_force), read_only_array(out.depth));
             });
           },
           "q"_a, "v"_a.none(), "parameters"_a)
       .def(
           "step_derivatives",
-          [](T& self, const std::string& integrator, double dt, nb::handle given_q,
-             nb::handle given_v, nb::handle given_tau, std::vector<Parameter> parameters) {
-            const auto [q, v, tau] = self.arguments(given_q, given_v, given_tau);
-            return self.at(q, v, [&, &q = q, &v = v, &tau = tau](SceneData& scene, auto&&) {
-              const Eigen::Index nv = v.size(), first = Eigen::Index(parameters.size());
+          [](T& self, const std::string& integrator, double dt, nb::handle q, nb::handle v,
+             nb::handle tau, std::vector<Parameter> parameters) {
+            return at_given(self, q, v, tau, [&](const At& at, const VectorX& tau) {
+              const Eigen::Index nv = at.v.size(), first = Eigen::Index(parameters.size());
               // Made before the scene is evaluated: it asks contacts for their derivatives.
-              StepSlopes slopes(scene, std::move(parameters));
-              HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
+              StepSlopes slopes(at.scene, std::move(parameters));
+              HeldStep step(at, integrator, dt, tau);
               const State& end = step.take();
-              const Tangent tangent = step.derivatives(slopes);
-              MatrixX by(2 * nv, tangent.q.cols());
-              by << tangent.q, tangent.v;
+              const MatrixX by = step.derivatives(slopes).topRows(2 * nv);
               return nb::make_tuple(read_only_array(end.q), read_only_array(end.v),
                                     read_only_array(by.middleCols(first, 2 * nv)),
                                     read_only_array(by.rightCols(nv)),

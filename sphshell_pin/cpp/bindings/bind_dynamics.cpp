@@ -97,17 +97,13 @@ void look_at(const Run& run, Visitor& visitor) {
   look_at(run.simulation.pairs(), visitor);
 }
 
-// A method of q and v, which are checked: what answer(scene, evaluate, q, v) makes of a scene
-// there.
+// A method of q and v: what answer(at) makes of a scene there.
 template <class T, class Answer>
 void def_at_state(nb::class_<T>& bound, const char* name, Answer answer) {
   bound.def(
       name,
-      [answer](T& self, nb::handle given_q, nb::handle given_v) {
-        const auto [q, v, tau] = self.arguments(given_q, given_v, nb::none());
-        return self.at(q, v, [&, &q = q, &v = v](SceneData& scene, auto&& evaluate) {
-          return answer(scene, evaluate, q, v);
-        });
+      [answer](T& self, nb::handle q, nb::handle v) {
+        return at_given(self, q, v, nb::none(), [&](const At& at, auto&&) { return answer(at); });
       },
       "q"_a, "v"_a.none() = nb::none());
 }
@@ -117,32 +113,43 @@ template <class T>
 void bind_evaluations(nb::class_<T>& bound) {
   bound.def(nb::init<nb::object, nb::object, std::vector<Pair>, JointForces::Effects, nb::object>(),
             "model"_a, "shown"_a, "pairs"_a, "joints"_a.none(), "convert"_a);
-  def_at_state(bound, "external_forces", [](SceneData& scene, auto&& evaluate, auto&&...) {
-    evaluate();
-    const Forces none(scene.touching() ? 0 : scene.external().size(), pinocchio::Force::Zero());
-    return to_python(scene.touching() ? scene.external() : none);
+  def_at_state(bound, "external_forces", [](const At& at) {
+    at.evaluate();
+    const Forces& all = at.scene.external();
+    return to_python(at.scene.touching() ? all : Forces(all.size(), pinocchio::Force::Zero()));
   });
-  def_at_state(bound, "joint_forces",
-               [](SceneData& scene, auto&& evaluate, const VectorX&, const VectorX& v) {
-                 evaluate();
-                 const JointForces& joints = scene.joints();
-                 return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(v.size())));
-               });
-  def_at_state(bound, "contacts",
-               [](SceneData& scene, auto&& evaluate, const VectorX& q, const VectorX& v) {
-                 std::vector<ContactRow> rows;
-                 evaluate();
-                 scene.log(q, v, rows);
-                 return to_bytes(std::move(rows));
-               });
-  def_at_state(bound, "contact_derivatives",
-               [](SceneData&, auto&& evaluate, const VectorX& q, const VectorX& v) {
-                 Linearization& linearization = evaluate.linearization();
-                 evaluate();
-                 MatrixX by_q, by_v;
-                 linearization.forces(q, v, by_q, by_v);
-                 return std::pair(to_array(by_q), to_array(by_v));
-               });
+  def_at_state(bound, "joint_forces", [](const At& at) {
+    at.evaluate();
+    const JointForces& joints = at.scene.joints();
+    return to_array(joints.act() ? joints.torque() : VectorX(VectorX::Zero(at.v.size())));
+  });
+  def_at_state(bound, "contacts", [](const At& at) {
+    at.evaluate();
+    return to_bytes(at.rows());
+  });
+  def_at_state(bound, "contact_derivatives", [](const At& at) {
+    Linearization& linearization = at.state.linearization();
+    at.evaluate();
+    MatrixX by_q, by_v;
+    linearization.forces(at.q, at.v, by_q, by_v);
+    return std::pair(to_array(by_q), to_array(by_v));
+  });
+}
+
+// answer(at) where a scene without memory was evaluated with the bristles z; for tests of both.
+template <class Answer>
+auto with_bristles(Answer answer) {
+  return [answer](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
+                  const VectorX& tau) {
+    return self.at(q, v, [&](const At& at) {
+      check_count("z", z.size(), at.scene.bristle_size());
+      check_count("tau", tau.size(), v.size());
+      Linearization& linearization = at.state.linearization();
+      at.scene.restart();
+      at.scene.evaluate(q, v, z);
+      return to_array(answer(at, linearization, z, tau));
+    });
+  };
 }
 
 }  // namespace
@@ -217,32 +224,17 @@ void bind_dynamics(nb::module_& m) {
   nb::class_<Evaluations> scene(m, "Scene", slots<Evaluations>());
   bind_evaluations(scene);
   scene.def_prop_ro("bristle_size", &Evaluations::bristle_size)
-      .def("rates",
-           [](Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& z,
-              const VectorX& tau) {
-             return self.at(q, v, [&](SceneData& scene, auto&&) {
-               check_count("z", z.size(), scene.bristle_size());
-               check_count("tau", tau.size(), v.size());
-               scene.restart();
-               scene.evaluate(q, v, z);
-               VectorX out(v.size() + z.size());
-               out << scene.acceleration(q, v, tau), scene.bristle_rates();
-               return to_array(out);
-             });
-           })
-      .def("rate_jacobian", [](Evaluations& self, const VectorX& q, const VectorX& v,
-                               const VectorX& z, const VectorX& tau) {
-        return self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-          check_count("z", z.size(), scene.bristle_size());
-          check_count("tau", tau.size(), v.size());
-          Linearization& linearization = evaluate.linearization();
-          scene.restart();
-          scene.evaluate(q, v, z);
-          MatrixX jacobian;
-          linearization.rates(q, v, z, tau, jacobian);
-          return to_array(jacobian);
-        });
-      });
+      .def("rates", with_bristles([](const At& at, auto&&, auto&& z, const VectorX& tau) {
+             VectorX out(at.v.size() + z.size());
+             out << at.scene.acceleration(at.q, at.v, tau), at.scene.bristle_rates();
+             return out;
+           }))
+      .def("rate_jacobian", with_bristles([](const At& at, Linearization& linearization,
+                                             const VectorX& z, const VectorX& tau) {
+             MatrixX out;
+             linearization.rates(at.q, at.v, z, tau, out);
+             return out;
+           }));
 
   // A state that remembers contacts and bristles, for a loop of the user's own.
   nb::class_<OwnState> state(m, "SceneState", slots<OwnState>());
@@ -348,6 +340,8 @@ void bind_dynamics(nb::module_& m) {
       .def_prop_ro("progress",
                    [](Run& self) { return call_alone(self, "state", &Simulation::progress); });
   // State and figures at any time during the run.
-  bind_figures<Simulation>(
-      run, [](Run& self, auto figure) { return call_alone(self, "state", figure); });
+  bind_figures(run, [](Run& self) {
+    const Use use(self.user, "state");
+    return self.simulation.figures();
+  });
 }

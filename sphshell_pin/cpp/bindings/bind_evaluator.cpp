@@ -13,28 +13,24 @@ using Rows = Eigen::Ref<RowMajor>;
 constexpr int kForce = 4;  // numbers of a pair: normal force, force in the world
 
 // Arrays are written in place: their sizes must be right.
-void check_forces(const SceneData& scene, const Rows& forces, Eigen::Index columns) {
-  check_count("rows of forces", forces.rows(),
-              kForce * static_cast<Eigen::Index>(scene.pairs().size()));
-  check_count("columns of forces", forces.cols(), columns);
+template <class Matrix>
+void check_shape(const char* name, const Matrix& x, Eigen::Index rows, Eigen::Index columns) {
+  if (x.rows() == rows && x.cols() == columns) return;
+  raise_own("InvalidParameter", name, nb::make_tuple(x.rows(), x.cols()),
+            "must have shape (" + std::to_string(rows) + ", " + std::to_string(columns) + ")");
 }
 
-void check_slopes(const Columns& by_state, const Columns& by_tau, Eigen::Index rows,
-                  Eigen::Index nv) {
-  check_count("rows of by_state", by_state.rows(), rows);
-  check_count("columns of by_state", by_state.cols(), 2 * nv);
-  check_count("rows of by_tau", by_tau.rows(), rows);
-  check_count("columns of by_tau", by_tau.cols(), nv);
-}
-
-// Adds up the forces of each pair: 4 pairs rows, one column.
-void sum_forces(SceneData& scene, const VectorX& q, const VectorX& v, Rows forces) {
-  check_forces(scene, forces, 1);
+// Clears the forces of each pair: 4 pairs rows.
+void clear(const SceneData& scene, Rows forces, Eigen::Index columns) {
+  check_shape("forces", forces, kForce * static_cast<Eigen::Index>(scene.pairs().size()), columns);
   forces.setZero();
-  if (!scene.touching()) return;
-  std::vector<ContactRow> rows;
-  scene.log(q, v, rows);
-  for (const ContactRow& row : rows) {
+}
+
+// Adds up the forces of each pair, in one column.
+void sum_forces(const At& at, Rows forces) {
+  clear(at.scene, forces, 1);
+  if (!at.scene.touching()) return;
+  for (const ContactRow& row : at.rows()) {
     auto force = forces.col(0).segment<kForce>(kForce * row.pair);
     force[0] += row.normal_force;
     force.tail<3>() += row.normal_force * Eigen::Map<const Vec3>(row.normal) +
@@ -43,60 +39,59 @@ void sum_forces(SceneData& scene, const VectorX& q, const VectorX& v, Rows force
 }
 
 // The same of their derivatives by q and v: 2 nv columns.
-void sum_slopes(Linearization& linearization, SceneData& scene, const VectorX& q, const VectorX& v,
-                Rows slopes) {
-  check_forces(scene, slopes, 2 * v.size());
-  slopes.setZero();
-  if (!scene.touching()) return;
-  std::vector<ContactRow> rows;
-  scene.log(q, v, rows);
+void sum_slopes(Linearization& linearization, const At& at, Rows slopes) {
+  const Eigen::Index columns = 2 * at.v.size();
+  clear(at.scene, slopes, columns);
+  if (!at.scene.touching()) return;
+  const std::vector<ContactRow> rows = at.rows();
   ContactForceSlopes found;
-  linearization.contact_forces(q, v, found);
+  linearization.contact_forces(at.q, at.v, found);
   for (std::size_t k = 0; k < rows.size(); ++k) {
     auto force = slopes.middleRows<kForce>(kForce * rows[k].pair);
-    force.row(0) += found.normal_force.row(k).head(2 * v.size());
-    force.bottomRows<3>() += found.force_world.middleRows<3>(3 * k).leftCols(2 * v.size());
+    force.row(0) += found.normal_force.row(k).head(columns);
+    force.bottomRows<3>() += found.force_world.middleRows<3>(3 * k).leftCols(columns);
   }
 }
 
 // Fills acceleration (nv), and the forces.
 void evaluate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
                    Out acceleration, Rows forces) {
-  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+  self.at(q, v, [&](const At& at) {
     check_count("tau", tau.size(), v.size());
     check_count("acceleration", acceleration.size(), v.size());
-    evaluate();
-    acceleration = scene.acceleration(q, v, tau);
-    sum_forces(scene, q, v, forces);
+    at.evaluate();
+    acceleration = at.scene.acceleration(q, v, tau);
+    sum_forces(at, forces);
   });
 }
 
 // Fills by_state (nv, 2 nv), by_tau (nv, nv), and those of the forces.
 void differentiate_into(Evaluations& self, const VectorX& q, const VectorX& v, const VectorX& tau,
                         Columns by_state, Columns by_tau, Rows forces_by_state) {
-  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
+  self.at(q, v, [&](const At& at) {
     const Eigen::Index nv = v.size();
     check_count("tau", tau.size(), nv);
-    check_slopes(by_state, by_tau, nv, nv);
-    Linearization& linearization = evaluate.linearization();
-    evaluate();
+    check_shape("by_state", by_state, nv, 2 * nv);
+    check_shape("by_tau", by_tau, nv, nv);
+    Linearization& linearization = at.state.linearization();
+    at.evaluate();
     MatrixX jacobian;
     // Rows of accelerations, columns of (u, v): those of bristles are left out.
-    linearization.rates(q, v, self.bristles(scene), tau, jacobian);
+    linearization.rates(q, v, at.state.bristles(), tau, jacobian);
     by_state = jacobian.topLeftCorner(nv, 2 * nv);
     by_tau = linearization.inverse_mass();
-    sum_slopes(linearization, scene, q, v, forces_by_state);
+    sum_slopes(linearization, at, forces_by_state);
   });
 }
 
 // Fills next (nq + nv), where a step leads, and the forces at its start.
 void step_into(Evaluations& self, const std::string& integrator, double dt, const VectorX& q,
                const VectorX& v, const VectorX& tau, Out next, Rows forces) {
-  self.at(q, v, [&](SceneData& scene, auto&&) {
+  self.at(q, v, [&](const At& at) {
     check_count("tau", tau.size(), v.size());
     check_count("next", next.size(), q.size() + v.size());
-    HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
-    sum_forces(scene, q, v, forces);
+    HeldStep step(at, integrator, dt, tau);
+    sum_forces(at, forces);
     const State& end = step.take();
     next << end.q, end.v;
   });
@@ -106,17 +101,18 @@ void step_into(Evaluations& self, const std::string& integrator, double dt, cons
 void differentiate_step_into(Evaluations& self, const std::string& integrator, double dt,
                              const VectorX& q, const VectorX& v, const VectorX& tau,
                              Columns by_state, Columns by_tau, Rows forces_by_state) {
-  self.at(q, v, [&](SceneData& scene, auto&&) {
+  self.at(q, v, [&](const At& at) {
     const Eigen::Index nv = v.size();
     check_count("tau", tau.size(), nv);
-    check_slopes(by_state, by_tau, 2 * nv, nv);
-    StepSlopes slopes(scene, {});
-    HeldStep step(scene, integrator, dt, q, v, self.bristles(scene), tau);
-    sum_slopes(slopes.linearization(), scene, q, v, forces_by_state);
+    check_shape("by_state", by_state, 2 * nv, 2 * nv);
+    check_shape("by_tau", by_tau, 2 * nv, nv);
+    StepSlopes slopes(at.scene, {});
+    HeldStep step(at, integrator, dt, tau);
+    sum_slopes(slopes.linearization(), at, forces_by_state);
     step.take();
-    const Tangent tangent = step.derivatives(slopes);
-    by_state << tangent.q.leftCols(2 * nv), tangent.v.leftCols(2 * nv);
-    by_tau << tangent.q.rightCols(nv), tangent.v.rightCols(nv);
+    const MatrixX by = step.derivatives(slopes).topRows(2 * nv);
+    by_state = by.leftCols(2 * nv);
+    by_tau = by.rightCols(nv);
   });
 }
 
@@ -131,10 +127,10 @@ struct Frame {
 // Fills residual: (3), the place against that of the reference, or (6), log6 of the placement in
 // the reference.
 void frame_into(Evaluations& self, const Frame& frame, const VectorX& q, Out residual) {
-  self.at(q, VectorX::Zero(self.model().nv), [&](SceneData& scene, auto&&) {
-    scene.body().need(frame.joint);
-    scene.body().kinematics(q);
-    const pinocchio::SE3 world_from_frame = frame.place(scene.body());
+  self.at(q, VectorX::Zero(self.model().nv), [&](const At& at) {
+    at.scene.body().need(frame.joint);
+    at.scene.body().kinematics(q);
+    const pinocchio::SE3 world_from_frame = frame.place(at.scene.body());
     if (residual.size() == 3)
       residual = world_from_frame.translation() - frame.reference.translation();
     else
@@ -147,9 +143,9 @@ void differentiate_frame_into(Evaluations& self, const Frame& frame, const Vecto
                               Columns by_q) {
   const VectorX v = VectorX::Zero(self.model().nv);
   check_count("columns of by_q", by_q.cols(), v.size());
-  self.at(q, v, [&](SceneData& scene, auto&& evaluate) {
-    Multibody& body = scene.body();
-    evaluate.linearization();  // prepares the axes
+  self.at(q, v, [&](const At& at) {
+    Multibody& body = at.scene.body();
+    at.state.linearization();  // prepares the axes
     body.need(frame.joint);
     body.place_axes(q);
     const pinocchio::SE3 world_from_frame = frame.place(body);

@@ -34,8 +34,7 @@ void bind_rollout(nb::module_& m) {
       .def_prop_ro("deep_start", [](const Outcome& self) { return as_python(self.deep_start); })
       .def_prop_ro("residual", [](const Outcome& self) { return residual(self.record.energy); })
       .def_prop_ro("through", &through);
-  bind_figures<Outcome>(outcome,
-                        [](const Outcome& self, auto figure) { return as_python(self.*figure); });
+  bind_figures(outcome, [](const Outcome& self) -> const Figures& { return self; });
 
   // Runs of one model on threads of their own.
   nb::class_<Rollout>(m, "Rollout")

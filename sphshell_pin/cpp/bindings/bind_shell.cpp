@@ -315,12 +315,6 @@ void bind_shell(nb::module_& m) {
       .def("closest_points", &closest_points, "points"_a, "smooth"_a, "threads"_a = 1)
       .def_prop_ro("num_elements", &Shell::num_elements)
       .def_prop_ro("num_patches", [](const Shell& s) { return s.topology().num_patches; })
-      .def_prop_ro("num_edges",
-                   [](const Shell& s) {
-                     const std::vector<Edge>& edges = s.topology().edges;
-                     return std::count_if(edges.begin(), edges.end(),
-                                          [](const Edge& e) { return !e.inner; });
-                   })
       .def_prop_ro(
           "pinched_vertices",
           [](const Shell& s) { return to_array(column(s.topology().pinches, &Pinch::vertex)); },

@@ -12,13 +12,27 @@ inline void check_state(const pinocchio::Model& model, const VectorX& q, const V
   check_count("v", v.size(), model.nv);
 }
 
-// What a state answers at (q, v): its forces, when it is called.
-struct Evaluate {
+// A scene with what it remembers, for one call at (q, v).
+struct At {
   SceneState& state;
   const VectorX &q, &v;
-  void operator()() const { state.evaluate(q, v); }
-  Linearization& linearization() const { return state.linearization(); }
+  SceneData& scene = state.scene();
+
+  void evaluate() const { state.evaluate(q, v); }
+  // After evaluate().
+  std::vector<ContactRow> rows() const {
+    std::vector<ContactRow> out;
+    scene.log(q, v, out);
+    return out;
+  }
 };
+
+// answer(at, tau) at a state as users hand it over.
+template <class T, class Answer>
+auto at_given(T& self, nb::handle q, nb::handle v, nb::handle tau, Answer&& answer) {
+  const StateArgument given = self.arguments(q, v, tau);
+  return self.at(given.q, given.v, [&](const At& at) { return answer(at, given.tau); });
+}
 
 // A call has a state to itself: while its contact source runs, another thread, or the source
 // itself, may begin another. The interpreter's lock guards the fields.
@@ -34,7 +48,7 @@ class Evaluations {
 
   const StateArguments arguments;
 
-  // work(scene, evaluate) at a state whose sizes are checked.
+  // work(at) at a state whose sizes are checked; bristles are unstretched.
   template <class Work>
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
     check_state(model(), q, v);
@@ -46,13 +60,11 @@ class Evaluations {
       idle_.pop_back();
     }
     const GiveBack give_back{idle_, state};
-    return work(state->scene(), Evaluate{*state, q, v});
+    return work(At{*state, q, v});
   }
 
   const pinocchio::Model& model() const { return first_.scene().body().model(); }
   int bristle_size() const { return first_.scene().bristle_size(); }
-  // Unstretched.
-  VectorX bristles(const SceneData& scene) const { return VectorX::Zero(scene.bristle_size()); }
 
   // Those at work are not among them: what holds them is alive.
   template <class Visit>
@@ -90,9 +102,8 @@ struct OwnState {
   auto at(const VectorX& q, const VectorX& v, Work&& work) {
     const Use use(user, "evaluation");
     check_state(state.scene().body().model(), q, v);
-    return work(state.scene(), Evaluate{state, q, v});
+    return work(At{state, q, v});
   }
-  VectorX bristles(const SceneData&) const { return state.bristles(); }
   void advance(const VectorX& q, const VectorX& v, double dt) {
     const Use use(user, "advance");
     state.advance(q, v, dt);

@@ -1,28 +1,28 @@
 // A step of an integrator under held torques, and its derivatives.
 #pragma once
 
+#include "bindings/evaluations.hpp"
 #include "dynamics/derivatives/step_derivatives.hpp"
 #include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
 
-// From (q, v, z); the scene is left as it was.
+// The scene is left as it was.
 class HeldStep {
  public:
-  HeldStep(SceneData& scene, const std::string& integrator, double dt, const VectorX& q,
-           const VectorX& v, VectorX z, const VectorX& tau)
-      : scene_(scene),
-        before_(scene.least_relaxation()),
+  HeldStep(const At& at, const std::string& integrator, double dt, const VectorX& tau)
+      : scene_(at.scene),
+        before_(scene_.least_relaxation()),
         dt_(dt),
         torques_(tau),
-        stepper_(make_stepper(integrator, scene)),
-        chart_(scene, torques_),
-        start_{0, q, v, std::move(z), {}} {
+        stepper_(make_stepper(integrator, scene_)),
+        chart_(scene_, torques_),
+        start_{0, at.q, at.v, at.state.bristles(), {}} {
     // Explicit steps of this length hold bristles back.
-    scene.relax_in(stepper_->is_implicit() ? 0 : dt);
-    scene.restart();
+    scene_.relax_in(stepper_->is_implicit() ? 0 : dt);
+    scene_.restart();
     chart_.begin(start_);
-    scene.evaluate(q, v, start_.z, true);
+    scene_.evaluate(start_.q, start_.v, start_.z, true);
   }
   ~HeldStep() {
     scene_.restart();
@@ -36,15 +36,12 @@ class HeldStep {
     return end_;
   }
   // Of the end, after take(): by the parameters of `slopes`, q, v and the torques, in columns.
-  Tangent derivatives(StepSlopes& slopes) {
-    const Eigen::Index nv = start_.v.size(),
-                       first = Eigen::Index(slopes.linearization().parameters().size()),
-                       all = first + 3 * nv;
-    Tangent out{MatrixX::Zero(nv, all), MatrixX::Zero(nv, all),
-                MatrixX::Zero(start_.z.size(), all)};
-    MatrixX torque = MatrixX::Zero(nv, all);
-    out.q.middleCols(first, nv).setIdentity();
-    out.v.middleCols(first + nv, nv).setIdentity();
+  MatrixX derivatives(StepSlopes& slopes) {
+    const auto nv = start_.v.size();
+    const auto first = Eigen::Index(slopes.linearization().parameters().size());
+    MatrixX out = MatrixX::Zero(2 * nv + start_.z.size(), first + 3 * nv);
+    MatrixX torque = MatrixX::Zero(nv, out.cols());
+    out.block(0, first, 2 * nv, 2 * nv).setIdentity();
     torque.rightCols(nv).setIdentity();
     slopes.carry(chart_, *stepper_, dt_, torque, out);
     return out;

@@ -33,21 +33,22 @@ inline Array<double> as_python(const VectorX& x) { return to_array(x); }
 inline double as_python(double x) { return x; }
 inline bool as_python(bool x) { return x; }
 
-// What a run, while it goes on, and what is left of one tell alike: members of `Of`, functions or
-// fields, as read(self, member) has them.
-template <class Of, class T, class Read>
-void bind_figures(nb::class_<T>& bound, Read read) {
+// What a run, while it goes on, and what is left of one tell alike: figures_of(self).
+template <class T, class FiguresOf>
+void bind_figures(nb::class_<T>& bound, FiguresOf figures_of) {
   const auto figure = [&](const char* name, auto member) {
-    bound.def_prop_ro(name, [=](T& self) { return read(self, member); }, nb::rv_policy::automatic);
+    bound.def_prop_ro(
+        name, [=](T& self) { return as_python(figures_of(self).*member); },
+        nb::rv_policy::automatic);
   };
-  figure("time", &Of::time);
-  figure("last_step", &Of::last_step);
-  figure("wall_time", &Of::wall_time);
-  figure("counts", &Of::counts);
-  figure("q", &Of::q);
-  figure("v", &Of::v);
-  figure("summaries", &Of::summaries);
-  figure("limits", &Of::limits);
+  figure("time", &Figures::time);
+  figure("last_step", &Figures::last_step);
+  figure("wall_time", &Figures::wall_time);
+  figure("counts", &Figures::counts);
+  figure("q", &Figures::q);
+  figure("v", &Figures::v);
+  figure("summaries", &Figures::summaries);
+  figure("limits", &Figures::limits);
 }
 
 }  // namespace sphshell

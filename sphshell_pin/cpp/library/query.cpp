@@ -26,15 +26,7 @@ struct Query::Impl {
   std::vector<Contact> shown, terms;
 };
 
-Query::Query() : impl_(std::make_unique<Impl>()) {}
-Query::Query(const Query& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
-Query& Query::operator=(const Query& other) {
-  *impl_ = *other.impl_;
-  return *this;
-}
-Query::Query(Query&&) noexcept = default;
-Query& Query::operator=(Query&&) noexcept = default;
-Query::~Query() = default;
+Query::Query() : impl_(new Impl) {}
 
 const std::vector<Contact>& Query::contacts(const Shell& shell, const Eigen::Vector3d& center,
                                             double radius, Method method) {

@@ -77,8 +77,7 @@ struct Scene::Impl {
   std::vector<core::Pair> pairs;
   core::JointForces::Effects joints;  // nothing acts in them; with the compiled robot, or null
 
-  // A sphere as a frame at its center, in its joint.
-  // `joint` receives the number of the joint that carries the frame.
+  // A sphere as a frame at its center, in its joint, whose number goes into `joint`.
   SE3 center_of(const Sphere& sphere, int& joint) const {
     check_positive("radius", sphere.radius, " [m]");
     check_point("offset", sphere.offset);
@@ -87,22 +86,26 @@ struct Scene::Impl {
     return frame.placement * SE3(Eigen::Matrix3d::Identity(), sphere.offset);
   }
 
-  int add(core::Pair pair) {
+  // Adds the pair of a sphere and what it touches; returns its number.
+  int add(core::Pair pair, const Sphere& sphere, const std::string& touched, const NormalLaw& law,
+          const FrictionLaw& friction) {
+    pair.name = sphere.frame + "-" + touched;
+    pair.radius = sphere.radius;
+    pair.law = law.core();
+    pair.friction = friction.core();
     pairs.push_back(std::move(pair));
     return static_cast<int>(pairs.size()) - 1;
   }
 };
 
-Scene::Scene(const Model& model) {
+// The model, unless Pinocchio's algorithms would not survive it.
+static const Model& checked(const Model& model) {
   if (const auto fault = core::model_fault(model))
     throw InvalidParameter(fault->name, fault->value, fault->must);
-  impl_.reset(new Impl{model, {}, {}});
+  return model;
 }
-Scene::Scene(const Scene& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
-Scene& Scene::operator=(const Scene& other) { return *this = Scene(other); }
-Scene::Scene(Scene&&) noexcept = default;
-Scene& Scene::operator=(Scene&&) noexcept = default;
-Scene::~Scene() = default;
+
+Scene::Scene(const Model& model) : impl_(new Impl{checked(model), {}, {}}) {}
 
 // Frames are found by name once, and kept as joint and placement.
 int Scene::add_contact(const Sphere& sphere, const Shell& shell, const NormalLaw& law,
@@ -114,12 +117,8 @@ int Scene::add_contact(const Sphere& sphere, const Shell& shell, const NormalLaw
   const pinocchio::Frame& frame = find_frame(impl_->model, mount.frame);
   pair.joint_j = static_cast<int>(frame.parentJoint);
   pair.placement_j = frame.placement * mount.placement;
-  pair.radius = sphere.radius;
   pair.geometry = core::ShellSurface{{}, shell.impl().with(mount.method), method};
-  pair.law = law.core();
-  pair.friction = friction.core();
-  pair.name = sphere.frame + "-" + mount.frame;
-  return impl_->add(std::move(pair));
+  return impl_->add(std::move(pair), sphere, mount.frame, law, friction);
 }
 
 int Scene::add_contact(const Sphere& sphere, const Sphere& other, const NormalLaw& law,
@@ -127,12 +126,8 @@ int Scene::add_contact(const Sphere& sphere, const Sphere& other, const NormalLa
   core::Pair pair;
   pair.placement_i = impl_->center_of(sphere, pair.joint_i);
   pair.placement_j = impl_->center_of(other, pair.joint_j);
-  pair.radius = sphere.radius;
   pair.geometry = core::Ball{{}, other.radius};
-  pair.law = law.core();
-  pair.friction = friction.core();
-  pair.name = sphere.frame + "-" + other.frame;
-  return impl_->add(std::move(pair));
+  return impl_->add(std::move(pair), sphere, other.frame, law, friction);
 }
 
 void Scene::set_relaxation(int pair, double time) {
@@ -172,12 +167,7 @@ struct SceneState::Impl {
   }
 };
 
-SceneState::SceneState(const Scene& scene) : impl_(std::make_unique<Impl>(scene.impl())) {}
-SceneState::SceneState(const SceneState& other) : impl_(std::make_unique<Impl>(*other.impl_)) {}
-SceneState& SceneState::operator=(const SceneState& other) { return *this = SceneState(other); }
-SceneState::SceneState(SceneState&&) noexcept = default;
-SceneState& SceneState::operator=(SceneState&&) noexcept = default;
-SceneState::~SceneState() = default;
+SceneState::SceneState(const Scene& scene) : impl_(new Impl(scene.impl())) {}
 
 const std::vector<pinocchio::Force>& SceneState::external_forces(const Eigen::VectorXd& q,
                                                                  const Eigen::VectorXd& v) {

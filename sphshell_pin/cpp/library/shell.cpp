@@ -90,12 +90,6 @@ Vec3 unit_or_zero(const Vec3& x) {
   return largest > 0 ? Vec3((x / largest).normalized()) : Vec3(Vec3::Zero());
 }
 
-Eigen::AlignedBox3d box_of(const Points& vertices) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& v : vertices) box.extend(v);
-  return box;
-}
-
 // Options by themselves, before anything is built.
 void check(const ShellOptions& options, std::size_t vertices) {
   const double angle = options.crease_angle;
@@ -172,7 +166,9 @@ Side Shell::side() const { return static_cast<Side>(impl_->shell->side()); }
 Surface weld(const Surface& surface, double tolerance) {
   check_not_negative("tolerance", tolerance, " [m]");
   check_surface(surface.vertices, surface.elements);
-  if (tolerance == 0) tolerance = kWeldTolerance * box_of(surface.vertices).diagonal().norm();
+  Eigen::AlignedBox3d box;
+  for (const Vec3& v : surface.vertices) box.extend(v);
+  if (tolerance == 0) tolerance = kWeldTolerance * box.diagonal().norm();
   const core::Weld merged =
       core::weld({surface.vertices.front().data(), surface.vertices.size()}, tolerance);
   Surface out;

@@ -6,14 +6,6 @@
 
 namespace sphshell {
 
-using Changes = StepSlopes::Coordinates;
-
-static void add(Changes& to, double share, const Changes& rates) {
-  to.u += share * rates.u;
-  to.w += share * rates.w;
-  to.z += share * rates.z;
-}
-
 // The differences to both sides: alike where the slopes are smooth. Where a kink is on one side, as
 // a touch within what is differenced, that of the other side.
 static MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& after) {
@@ -26,67 +18,57 @@ static MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const Ma
 }
 
 // Along the dense output, which solves the same equations to their tolerance.
-void Stepper::carry_along(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
-  slopes.along(chart, *this, h, 1, tangent);
+void Stepper::carry_along(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const {
+  slopes.along(chart, *this, h, 1, changes);
 }
 
-void SemiImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
+void SemiImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const {
   // The method's own formulas, differentiated line by line.
-  Changes at = slopes.at_origin(), rates;
-  slopes.rates(chart, chart.origin().t, start_, at, rates);
-  at.w += h * rates.w;
-  at.u = h * at.w;
+  const int nv = chart.nv();
+  MatrixX at = slopes.at_origin();
+  const MatrixX rates = slopes.rates(chart, chart.origin().t, start_, at);
+  at.bottomRows(at.rows() - nv) += h * rates.bottomRows(at.rows() - nv);
+  at.topRows(nv) = h * at.middleRows(nv, nv);
   if (chart.nz() > 0)
-    at.z += h * slopes.bristle_rates(chart, y_.segment(chart.nv(), chart.nv()), at.w);
-  slopes.finish(chart, y_, at, tangent);
+    at.bottomRows(chart.nz()) =
+        changes.bottomRows(chart.nz()) +
+        h * slopes.bristle_rates(chart, y_.segment(nv, nv), at.middleRows(nv, nv));
+  changes = slopes.finish(chart, y_, at);
 }
 
 // Every stage's state changes with the stages before it.
-void ExplicitRungeKutta::carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {
+void ExplicitRungeKutta::carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const {
   const double t = chart.origin().t;
-  const Changes start = slopes.at_origin();
+  const MatrixX start = slopes.at_origin();
   // One set of changes for each stage.
-  std::vector<Changes> rates(k_.size());
-  slopes.rates(chart, t, start_, start, rates[0]);
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
+  std::vector<MatrixX> rates{slopes.rates(chart, t, start_, start)};
+  for (const Row& row : rows_) {
     VectorX y = start_;
-    Changes at = start;
-    for (std::size_t j = 0; j <= i; ++j) {
-      if (rows_[i].a[j] == 0) continue;
-      y += h * rows_[i].a[j] * k_[j];
-      add(at, h * rows_[i].a[j], rates[j]);
+    MatrixX at = start;
+    for (std::size_t j = 0; j < rates.size(); ++j) {
+      if (row.a[j] == 0) continue;
+      y += h * row.a[j] * k_[j];
+      at += h * row.a[j] * rates[j];
     }
-    slopes.rates(chart, t + rows_[i].node * h, y, at, rates[i + 1]);
+    rates.push_back(slopes.rates(chart, t + row.node * h, y, at));
   }
-  Changes end = start;
-  for (std::size_t i = 0; i < weights_.size(); ++i) add(end, h * weights_[i], rates[i]);
-  slopes.finish(chart, y_, end, tangent);
+  MatrixX end = start;
+  for (std::size_t i = 0; i < weights_.size(); ++i) end += h * weights_[i] * rates[i];
+  changes = slopes.finish(chart, y_, end);
 }
 
 // With (I / h - J) k = f for the change k of y, (I / h - J) dk = df + dJ k. The last term is the
 // second derivative of the rates, of which one direction, k, is differenced.
 void LinearlyImplicitEuler::carry(StepSlopes& slopes, Chart& chart, double h,
-                                  Tangent& tangent) const {
+                                  MatrixX& changes) const {
   constexpr double kShare = 1e-3;  // of the step
-  const double t = chart.origin().t;
-  const Changes start = slopes.at_origin();
-  Changes right, before, after;
-  slopes.rates(chart, t, start_, start, right);
-  for (const auto& [sign, bent] : {std::pair(-1.0, &before), std::pair(1.0, &after)}) {
-    const VectorX y = start_ + sign * kShare * (y_ - start_);
-    slopes.rates(chart, t + sign * kShare * h, y, start, *bent);
-  }
-  const Changes bend{beside_kinks(before.u, right.u, after.u),
-                     beside_kinks(before.w, right.w, after.w),
-                     beside_kinks(before.z, right.z, after.z)};
-  add(right, 1 / kShare, bend);
-  const Eigen::Index nv = chart.nv(), nz = chart.nz();
-  MatrixX all(2 * nv + nz, right.u.cols());
-  all << right.u, right.w, right.z;
-  const MatrixX change = solved(all);
-  Changes end = start;
-  add(end, 1, {change.topRows(nv), change.middleRows(nv, nv), change.bottomRows(nz)});
-  slopes.finish(chart, y_, end, tangent);
+  const MatrixX start = slopes.at_origin();
+  const auto rates_at = [&](double share) {
+    return slopes.rates(chart, chart.origin().t + share * h, start_ + share * (y_ - start_), start);
+  };
+  const MatrixX here = rates_at(0), before = rates_at(-kShare), after = rates_at(kShare);
+  const MatrixX bend = beside_kinks(before, here, after);
+  changes = slopes.finish(chart, y_, start + solved(here + bend / kShare));
 }
 
 }  // namespace sphshell

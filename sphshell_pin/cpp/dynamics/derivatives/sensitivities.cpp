@@ -21,9 +21,9 @@ Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
   parameters_ = static_cast<Eigen::Index>(slopes_.linearization().parameters().size());
   const Eigen::Index last = parameters_ + (settings.by_q0 ? nv : 0);
   columns_ = last + (settings.by_v0 ? nv : 0);
-  now_ = {MatrixX::Zero(nv, columns_), MatrixX::Zero(nv, columns_), MatrixX::Zero(nz, columns_)};
-  if (settings.by_q0) now_.q.middleCols(parameters_, nv).setIdentity();
-  if (settings.by_v0) now_.v.middleCols(last, nv).setIdentity();
+  now_.setZero(2 * nv + nz, columns_);
+  if (settings.by_q0) now_.block(0, parameters_, nv, nv).setIdentity();
+  if (settings.by_v0) now_.block(nv, last, nv, nv).setIdentity();
   torque_.setZero(nv, columns_);
 }
 
@@ -45,7 +45,7 @@ void Sensitivities::accept(const State& to, bool located) {
   std::swap(now_, next_);
   if (located) jump(to);
   made_ = nullptr;
-  if (now_.z.rows() == 0) return;
+  if (to.z.size() == 0) return;
   if (located) begin_contacts(to);
   reorder_bristles(to.z);
 }
@@ -70,7 +70,8 @@ void Sensitivities::jump(const State& to) {
   // A step ends a little behind its event, where forces have grown by next to nothing.
   if ((last - first).norm() < kJump * (first.norm() + last.norm() + to.v.norm())) return;
   const Eigen::RowVectorXd begin = time_of(to, touching, false), &time = begin.size() ? begin : end;
-  if (time.size() > 0) now_.v += (first - last) * time;
+  const Eigen::Index nv = to.v.size();
+  if (time.size() > 0) now_.middleRows(nv, nv) += (first - last) * time;
 }
 
 std::vector<char> Sensitivities::touching_pairs() const {
@@ -115,38 +116,33 @@ void Sensitivities::begin_contacts(const State& to) {
     if (!(rate > 0) || active[i].contact.depth > kJustBegun * rate * h_) continue;
     const int rings = scene_.pairs()[active[i].pair].friction.rings();
     const Eigen::Index at = 3 * active[i].slot, size = 3 * rings;
-    now_.z.middleRows(at, size) =
+    now_.middleRows(2 * to.v.size() + at, size) =
         scene_.bristle_rates().segment(at, size) * (depth_by.row(row_of[i]) / rate);
   }
 }
 
 // What SceneData::accept() makes of the stretches, of their changes.
 void Sensitivities::reorder_bristles(const VectorX& z) {
-  VectorX moved;
+  const Eigen::Index first = now_.rows() - z.size();
   const double size = z.cwiseAbs().maxCoeff();
   MatrixX out;
   for (Eigen::Index k = 0; k < columns_; ++k) {
-    const VectorX column = now_.z.col(k);
+    const VectorX column = now_.col(k).tail(z.size());
     const double change = column.cwiseAbs().maxCoeff();
     const double share = size > 0 && change > 0 ? kStretchDifference * size / change : 1;
-    VectorX sum;
-    for (const double sign : {1.0, -1.0}) {
-      moved = z + sign * share * column;
-      scene_.reorder_bristles(moved);
-      if (sign > 0)
-        sum = moved;
-      else
-        sum -= moved;
-    }
-    if (k == 0) out.resize(sum.size(), columns_);
-    out.col(k) = sum / (2 * share);
+    VectorX more = z + share * column, less = z - share * column;
+    scene_.reorder_bristles(more);
+    scene_.reorder_bristles(less);
+    if (k == 0) out.resize(more.size(), columns_);
+    out.col(k) = (more - less) / (2 * share);
   }
-  now_.z = out;
+  now_.conservativeResize(first + out.rows(), columns_);
+  now_.bottomRows(out.rows()) = out;
 }
 
 // Within a step the changes are carried to the row anew, from the start of the step.
 void Sensitivities::add_row(const State& state, double share) {
-  const Tangent* at = made_ ? &next_ : &now_;
+  const MatrixX* at = made_ ? &next_ : &now_;
   if (made_ && share < 1) {
     between_ = now_;
     slopes_.carry(made_->chart(), made_->stepper(), h_, torque_, between_, share);
@@ -154,8 +150,8 @@ void Sensitivities::add_row(const State& state, double share) {
     scene_.evaluate(state.q, state.v, state.z, true);
     at = &between_;
   }
-  append(record_.q, at->q);
-  append(record_.v, at->v);
+  append(record_.q, at->topRows(state.v.size()));
+  append(record_.v, at->middleRows(state.v.size(), state.v.size()));
   slopes_.linearization().contact_forces(state.q, state.v, contacts_);
   append(record_.force_world, changed(contacts_.force_world, *at));
   append(record_.normal_force, changed(contacts_.normal_force, *at));

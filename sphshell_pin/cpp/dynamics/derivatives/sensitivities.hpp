@@ -41,14 +41,14 @@ class Sensitivities : public RowFollower {
   void begin_contacts(const State& to);
   void reorder_bristles(const VectorX& z);
   // The change, as the state changes, of what has these slopes of contacts.
-  MatrixX changed(const MatrixX& slopes, const Tangent& by) const {
+  MatrixX changed(const MatrixX& slopes, const MatrixX& by) const {
     return applied(slopes, by, slopes.rightCols(parameters_));
   }
 
   SceneData& scene_;
   StepSlopes slopes_;
   Eigen::Index columns_, parameters_;
-  Tangent now_, next_, between_;  // at the state; at the end of the step that was made
+  MatrixX now_, next_, between_;  // at the state; at the end of the step that was made
   MatrixX torque_;                // held
   ContactForceSlopes contacts_;
   Stepping* made_ = nullptr;  // the step that was made, until it is accepted

@@ -24,26 +24,27 @@ StepSlopes::StepSlopes(SceneData& scene, std::vector<Parameter> parameters)
 }
 
 void StepSlopes::carry(Chart& chart, const Stepper& stepper, double h, const MatrixX& torque,
-                       Tangent& tangent, double share) {
-  const Tangent from = tangent;
+                       MatrixX& changes, double share) {
+  const MatrixX from = changes;
   origin_ = &from, torque_ = &torque;
   if (share < 1)
-    along(chart, stepper, h, share, tangent);
+    along(chart, stepper, h, share, changes);
   else
-    stepper.carry(*this, chart, h, tangent);
+    stepper.carry(*this, chart, h, changes);
   origin_ = nullptr, torque_ = nullptr;
 }
 
 // At the origin u is zero whatever the origin is: its change is that of the chart itself.
-StepSlopes::Coordinates StepSlopes::at_origin() const {
-  return {MatrixX::Zero(origin_->q.rows(), origin_->q.cols()), origin_->v, origin_->z};
+MatrixX StepSlopes::at_origin() const {
+  MatrixX out = *origin_;
+  out.topRows(torque_->rows()).setZero();
+  return out;
 }
 
-// From coordinates of the chart to changes of q and v.
-void StepSlopes::finish(Chart& chart, const VectorX& y, const Coordinates& by, Tangent& out) {
+// From coordinates of the chart to changes of the state.
+MatrixX StepSlopes::finish(Chart& chart, const VectorX& y, const MatrixX& by) {
   chart_slopes_.begin(chart, y);
-  chart_slopes_.place(origin_->q, by.u, by.w, out.q, out.v);
-  out.z = by.z;
+  return chart_slopes_.place(*origin_, by);
 }
 
 // At state_, which is evaluated.
@@ -129,67 +130,47 @@ void StepSlopes::torque_slopes(const TorqueAt& torque, double t, const VectorX& 
   if (torque(t, q, v) != here) remembers_ = true;
 }
 
-// Of (v', z').
-MatrixX StepSlopes::by_parameters() const {
-  MatrixX out = linearization_.by_parameters();
+MatrixX StepSlopes::own_rates() const {
+  const MatrixX &by = linearization_.by_parameters(), &inverse_mass = linearization_.inverse_mass();
+  MatrixX out = MatrixX::Zero(by.rows(), torque_->cols());
+  out.leftCols(by.cols()) = by;
+  out.topRows(torque_->rows()).noalias() += inverse_mass * *torque_;
   if (follows_)
-    out.topRows(tau_.size()).noalias() += linearization_.inverse_mass() * torque_by_parameters_;
+    out.topLeftCorner(torque_->rows(), by.cols()).noalias() += inverse_mass * torque_by_parameters_;
   return out;
 }
 
-void StepSlopes::rates(Chart& chart, double t, const VectorX& y, const Coordinates& by,
-                       Coordinates& out) {
-  const Eigen::Index nv = chart.nv(), nz = chart.nz();
+MatrixX StepSlopes::rates(Chart& chart, double t, const VectorX& y, const MatrixX& by) {
   chart.finish(t, y, state_);
   scene_.evaluate(state_.q, state_.v, state_.z);
   linearize(chart, t);
-  chart_slopes_.begin(chart, y);
-  chart_slopes_.place(origin_->q, by.u, by.w, q_by_, v_by_);
-  // Rows of the Jacobian times the changes, block by block, plus what held torques and parameters
-  // add.
-  out.w.noalias() = jacobian_.topLeftCorner(nv, nv) * q_by_;
-  out.w.noalias() += jacobian_.block(0, nv, nv, nv) * v_by_;
-  out.w.noalias() += jacobian_.topRightCorner(nv, nz) * by.z;
-  out.w.noalias() += linearization_.inverse_mass() * *torque_;
-  out.z.noalias() = jacobian_.bottomLeftCorner(nz, nv) * q_by_;
-  out.z.noalias() += jacobian_.block(nv, nv, nz, nv) * v_by_;
-  out.z.noalias() += jacobian_.bottomRightCorner(nz, nz) * by.z;
-  const MatrixX own = by_parameters();
-  out.w.leftCols(own.cols()) += own.topRows(nv);
-  out.z.leftCols(own.cols()) += own.bottomRows(nz);
+  const MatrixX at = finish(chart, y, by);
+  MatrixX out(by.rows(), by.cols());
+  out.bottomRows(jacobian_.rows()) = applied(jacobian_, at, own_rates());
   scene_.evaluate(state_.q, state_.v, state_.z);
   y_ = scene_.acceleration(state_.q, state_.v, tau_);
-  chart_slopes_.rates(y_, state_.v, by.u, by.w, v_by_, out.u, out.w);
+  chart_slopes_.rates(y_, state_.v, by, at, out);
+  return out;
 }
 
 // At the positions of the origin, which change by its change, with the velocity v, which changes by
 // v_by.
-const MatrixX& StepSlopes::bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by) {
+MatrixX StepSlopes::bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by) {
   const State& from = chart.origin();
-  const Eigen::Index nv = chart.nv(), nz = chart.nz();
   scene_.evaluate(from.q, v, from.z);
   linearization_.rates(from.q, v, from.z, tau_, jacobian_);
-  rates_.noalias() = jacobian_.bottomLeftCorner(nz, nv) * origin_->q;
-  rates_.noalias() += jacobian_.block(nv, nv, nz, nv) * v_by;
-  rates_.noalias() += jacobian_.bottomRightCorner(nz, nz) * origin_->z;
-  const MatrixX& by = linearization_.by_parameters();
-  rates_.leftCols(by.cols()) += by.bottomRows(nz);
-  return rates_;
+  MatrixX at = *origin_;
+  at.middleRows(v.size(), v.size()) = v_by;
+  return applied(jacobian_.bottomRows(chart.nz()), at,
+                 linearization_.by_parameters().bottomRows(chart.nz()));
 }
 
 // Errors are measured in units of the parameters: each column times its scale.
-void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share, Tangent& out) {
-  const Path path{chart, stepper, h};
-  const Eigen::Index nv = chart.nv(), nz = chart.nz();
-  MatrixX changes(2 * nv + nz, origin_->q.cols());
-  changes << origin_->q, origin_->v, origin_->z;
+void StepSlopes::along(Chart& chart, const Stepper& stepper, double h, double share, MatrixX& out) {
   const std::vector<Parameter>& parameters = linearization_.parameters();
-  scales_.setOnes(changes.cols());
+  scales_.setOnes(out.cols());
   for (std::size_t c = 0; c < parameters.size(); ++c) scales_[c] = parameters[c].scale;
-  follow(path, 0, share, 0, changes);
-  out.q = changes.topRows(nv);
-  out.v = changes.middleRows(nv, nv);
-  out.z = changes.bottomRows(nz);
+  follow({chart, stepper, h}, 0, share, 0, out);
 }
 
 // Halves are taken until they agree: in free flight a body may turn far in a step; where friction
@@ -252,9 +233,7 @@ bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& change
     slope[i].bottomRows(nv + nz) = jacobian_;
     add_turning(scene_.body(), state_.v, slope[i]);
     force[i].setZero(n, m);
-    force[i].middleRows(nv, nv).noalias() = linearization_.inverse_mass() * *torque_;
-    const MatrixX own = by_parameters();
-    force[i].bottomLeftCorner(nv + nz, own.cols()) += own;
+    force[i].bottomRows(nv + nz) = own_rates();
     for (Eigen::Index k = 2 * nv; k < n; ++k)
       if (!slope[i].row(k).isZero(0) || !slope[i].col(k).isZero(0)) lives[k] = 1;
   }

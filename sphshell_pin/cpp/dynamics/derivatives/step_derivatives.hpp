@@ -11,39 +11,34 @@ class Stepper;
 // Torques at a state at which the scene has been evaluated.
 using TorqueAt = std::function<const VectorX&(double t, const VectorX& q, const VectorX& v)>;
 
-// Changes have one column each; the first ones are those of the parameters.
+// Changes as ChartSlopes has them; the first columns are those of the parameters.
 class StepSlopes {
  public:
   StepSlopes(SceneData& scene, std::vector<Parameter> parameters);
 
-  // Changes of the coordinates u, w and z of a chart, or of their rates.
-  struct Coordinates {
-    MatrixX u, w, z;
-  };
-
-  // Moves `tangent` from the chart's origin to the end of the last step of `stepper`, h long, or to
+  // Moves `changes` from the chart's origin to the end of the last step of `stepper`, h long, or to
   // a share of it by its dense output, where held torques change by `torque` (nv). Leaves the scene
   // evaluated elsewhere.
   void carry(Chart& chart, const Stepper& stepper, double h, const MatrixX& torque,
-             Tangent& tangent, double share = 1);
+             MatrixX& changes, double share = 1);
 
   // What carry() is made of. The changes of the rates at y that go with those of y.
-  void rates(Chart& chart, double t, const VectorX& y, const Coordinates& by, Coordinates& out);
+  MatrixX rates(Chart& chart, double t, const VectorX& y, const MatrixX& by);
   // As carry(), from the rates of bristles at the chart's origin with another velocity.
-  const MatrixX& bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by);
+  MatrixX bristle_rates(Chart& chart, const VectorX& v, const MatrixX& v_by);
   // The changes of y at the origin, and those of a state from those of y there.
-  Coordinates at_origin() const;
-  void finish(Chart& chart, const VectorX& y, const Coordinates& by, Tangent& out);
+  MatrixX at_origin() const;
+  MatrixX finish(Chart& chart, const VectorX& y, const MatrixX& by);
   // Moves the changes at the origin to the share of the step's dense output, by the Radau method of
   // order 5 for the equations of the changes, which are linear, in steps as short as they need.
-  void along(Chart& chart, const Stepper& stepper, double h, double share, Tangent& out);
+  void along(Chart& chart, const Stepper& stepper, double h, double share, MatrixX& out);
 
   // Differences torques at a state by (u, v, z), (nv, 2 nv + nz), and by the parameters.
   void torque_slopes(const TorqueAt& torque, double t, const VectorX& q, const VectorX& v,
                      const VectorX& z);
 
   // The changes of torques whose slopes were found last.
-  MatrixX held(const Tangent& at) const {
+  MatrixX held(const MatrixX& at) const {
     return applied(torque_slopes_, at, torque_by_parameters_);
   }
 
@@ -64,18 +59,18 @@ class StepSlopes {
   bool radau(const Path& path, double from, double to, MatrixX& changes);
   // The rates at a state, and how the last ones answer.
   void linearize(Chart& chart, double t);
-  // Of (v', z') by the parameters, at a held state.
-  MatrixX by_parameters() const;
+  // Of (v', z') by the torques that are held, and by the parameters, at a held state.
+  MatrixX own_rates() const;
 
   SceneData& scene_;
   Linearization linearization_;
   ChartSlopes chart_slopes_;
-  const Tangent* origin_ = nullptr;
+  const MatrixX* origin_ = nullptr;
   const MatrixX* torque_ = nullptr;
   State state_;
   VectorX tau_, q_, v_, z_, u_, y_;
   VectorX scales_;  // of the columns
-  MatrixX jacobian_, torque_slopes_, torque_by_parameters_, q_by_, v_by_, rates_;
+  MatrixX jacobian_, torque_slopes_, torque_by_parameters_;
   bool follows_ = false;  // torques do, and torque_slopes_ says how
   bool remembers_ = false;
 };

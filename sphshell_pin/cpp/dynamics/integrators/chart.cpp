@@ -2,8 +2,12 @@
 
 namespace sphshell {
 
-using Group = CurvedSegment::Group;
-using Vec2 = Eigen::Vector2d;
+// x in the axes that a segment has at q: of a quaternion, or of cosine and sine.
+Vec3 turned(const CurvedSegment& s, const VectorX& q, const Vec3& x) {
+  const double* at = q.data() + s.index_q + s.linear;
+  if (s.angular == 3) return Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(at)) * x;
+  return {at[0] * x[0] - at[1] * x[1], at[1] * x[0] + at[0] * x[1], 0};
+}
 
 // The rate of u where exp(u) turns with the angular velocity w, in turning axes.
 static Vec3 angle_rate(const Vec3& u, const Vec3& w) {
@@ -40,20 +44,13 @@ void Chart::place(const VectorX& y, VectorX& q, VectorX& v) const {
   scene_.body().integrate(origin_->q, u_, q);
   v = y.segment(nv_, nv_);
   for (const CurvedSegment& s : scene_.body().curved()) {
-    const int i = s.index_v, k = s.index_q;
-    if (s.group == Group::Rigid) {
-      // Position: the origin's plus u in the axes R0. Pinocchio's own exponential of SE(3) would
-      // couple it with the rotation. Velocity: from the axes R0 into the body's.
-      const Eigen::Quaterniond axes(Eigen::Map<const Eigen::Vector4d>(origin_->q.data() + k + 3));
-      q.segment<3>(k) = origin_->q.segment<3>(k) + axes * Vec3(u_.segment<3>(i));
-      v.segment<3>(i) = (rotation_of(-u_.segment<3>(i + 3)) * v.segment<3>(i)).eval();
-    } else if (s.group == Group::Planar) {
-      // The same in the plane; q holds cosine and sine.
-      Eigen::Matrix2d axes;
-      axes << origin_->q[k + 2], -origin_->q[k + 3], origin_->q[k + 3], origin_->q[k + 2];
-      q.segment<2>(k) = origin_->q.segment<2>(k) + axes * u_.segment<2>(i);
-      v.segment<2>(i) = (Eigen::Rotation2Dd(-u_[i + 2]) * Vec2(v.segment<2>(i))).eval();
-    }
+    const int n = s.linear;
+    if (n == 0) continue;
+    // Position: the origin's plus u in the axes R0. Pinocchio's own exponential of SE(3) would
+    // couple it with the rotation. Velocity: from the axes R0 into the body's.
+    q.segment(s.index_q, n) =
+        origin_->q.segment(s.index_q, n) + turned(s, origin_->q, s.linear_of(u_)).head(n);
+    v.segment(s.index_v, n) = (rotation_of(-s.angular_of(u_)) * s.linear_of(v)).head(n);
   }
 }
 
@@ -65,15 +62,8 @@ const VectorX& Chart::fill(double t, const VectorX& q, const VectorX& v, VectorX
   // Pinocchio's acceleration of a free body is that of components in the turning body; in axes that
   // stand still it is a + spin x v.
   out.segment(nv_, nv_) = scene_.acceleration(q, v, tau);
-  for (const CurvedSegment& s : scene_.body().curved()) {
-    const int i = s.index_v, a = nv_ + i;
-    if (s.group == Group::Rigid) {
-      out.segment<3>(a) += v.segment<3>(i + 3).cross(v.segment<3>(i));
-    } else if (s.group == Group::Planar) {
-      out[a] -= v[i + 2] * v[i + 1];
-      out[a + 1] += v[i + 2] * v[i];
-    }
-  }
+  for (const CurvedSegment& s : scene_.body().curved())
+    out.segment(nv_ + s.index_v, s.linear) += s.angular_of(v).cross(s.linear_of(v)).head(s.linear);
   out.segment(2 * nv_, nz()) = scene_.bristle_rates();
   const Powers& powers = scene_.powers();
   // The work of damping, friction and control is integrated like the state.
@@ -99,18 +89,11 @@ void Chart::rate(double t, const VectorX& y, VectorX& out) {
   fill(t, q_, v_, out);
   out.head(nv_) = y.segment(nv_, nv_);
   for (const CurvedSegment& s : scene_.body().curved()) {
-    const int i = s.index_v;
-    if (s.group == Group::Rigid) {
-      const Vec3 u = y.segment<3>(i + 3), w = y.segment<3>(nv_ + i + 3);
-      out.segment<3>(i + 3) = angle_rate(u, w);
-      // Into the axes of the chart, where the step began.
-      out.segment<3>(nv_ + i) = (rotation_of(u) * out.segment<3>(nv_ + i)).eval();
-    } else if (s.group == Group::Rotation) {
-      out.segment<3>(i) = angle_rate(y.segment<3>(i), y.segment<3>(nv_ + i));
-    } else {
-      out.segment<2>(nv_ + i) =
-          (Eigen::Rotation2Dd(y[i + 2]) * Vec2(out.segment<2>(nv_ + i))).eval();
-    }
+    const int n = s.linear, i = s.index_v;
+    const Vec3 u = s.angular_of(y), w = s.angular_of(y, nv_);
+    out.segment(i + n, s.angular) = angle_rate(u, w).tail(s.angular);
+    // Into the axes of the chart, where the step began.
+    if (n > 0) out.segment(nv_ + i, n) = (rotation_of(u) * s.linear_of(out, nv_)).head(n);
   }
 }
 

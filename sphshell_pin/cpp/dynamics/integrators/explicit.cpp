@@ -2,11 +2,6 @@
 
 namespace sphshell {
 
-void SemiImplicitEuler::begin(Chart& chart) {
-  chart.start(start_);
-  chart.rate_at_origin(rate_);
-}
-
 // All but the positions by the rates at the start; positions with the new velocities.
 void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
   const int nv = chart.nv(), all = static_cast<int>(start_.size());
@@ -26,8 +21,7 @@ void SemiImplicitEuler::step(Chart& chart, double h, State& out) {
 
 // The first stage is the rate at the start, which steps of any length share.
 void ExplicitRungeKutta::begin(Chart& chart) {
-  chart.start(start_);
-  chart.rate_at_origin(rate_);
+  Stepper::begin(chart);
   k_[0] = rate_;
 }
 

@@ -1,8 +1,6 @@
 // Explicit methods.
 #pragma once
 
-#include <tuple>
-
 #include "dynamics/integrators/stepper.hpp"
 
 namespace sphshell {
@@ -10,10 +8,8 @@ namespace sphshell {
 // v += dt a(q, v), then q is moved by dt v: order 1, symplectic for conservative forces.
 class SemiImplicitEuler : public Stepper {
  public:
-  static constexpr const char* kind = "semi-implicit-euler";  // in files
-  void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
   bool leaves_work() const override { return true; }
 };
 
@@ -22,7 +18,7 @@ class ExplicitRungeKutta : public Stepper {
  public:
   void begin(Chart& chart) override;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
 
  protected:
   struct Row {
@@ -42,7 +38,6 @@ class ExplicitRungeKutta : public Stepper {
 // The classical method of order 4.
 class RungeKutta4 : public ExplicitRungeKutta {
  public:
-  static constexpr const char* kind = "runge-kutta-4";  // in files
   RungeKutta4();
 };
 
@@ -50,17 +45,13 @@ class RungeKutta4 : public ExplicitRungeKutta {
 // output of order 4 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.6).
 class DormandPrince : public ExplicitRungeKutta {
  public:
-  static constexpr const char* kind = "adaptive";  // in files
   DormandPrince();
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
-    carry_along(slopes, chart, h, tangent);
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override {
+    carry_along(slopes, chart, h, changes);
   }
   int order_of_error() const override { return 5; }
   void interpolate(double theta, VectorX& y) const override;
 };
-
-// A new method is a class above, its name here, and a class of its kind in Python.
-using ExplicitMethods = std::tuple<SemiImplicitEuler, RungeKutta4, DormandPrince>;
 
 }  // namespace sphshell

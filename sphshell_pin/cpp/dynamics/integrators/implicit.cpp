@@ -2,7 +2,6 @@
 
 namespace sphshell {
 
-using Group = CurvedSegment::Group;
 using pinocchio::skew;
 
 // Of a step in a difference quotient.
@@ -14,8 +13,7 @@ void ImplicitStepper::begin(Chart& chart) {
   nv_ = chart.nv();
   nz_ = chart.nz();
   const int n = 2 * nv_ + nz_;
-  chart.start(start_);
-  chart.rate_at_origin(rate_);
+  Stepper::begin(chart);
   const State& from = chart.origin();
   torque_ = chart.torque_at_origin();
   linearization_.rates(from.q, from.v, from.z, torque_, rates_);
@@ -77,32 +75,18 @@ void ImplicitStepper::add_time(Chart& chart) {
 void ImplicitStepper::to_chart(Chart& chart) {
   const VectorX& v = chart.origin().v;
   for (const CurvedSegment& s : chart.scene().body().curved()) {
-    const int i = s.index_v, w = nv_ + i;
-    if (s.group == Group::Rotation) jacobian_.block<3, 3>(i, i) = -0.5 * skew(v.segment<3>(i));
-    if (s.group == Group::Rigid) {
-      const Vec3 linear = v.segment<3>(i), spin = v.segment<3>(i + 3);
-      const Vec3 acceleration = rate_.segment<3>(w);
-      // The body sees its linear velocity turn as it turns.
-      jacobian_.block(nv_, i + 3, nv_ + nz_, 3) +=
-          (jacobian_.block(nv_, w, nv_ + nz_, 3) * skew(linear)).eval();
-      // The derivative of (rotation of a + spin x v) at u = 0, where the rotation's derivative is
-      // -[ . ]x.
-      jacobian_.block<3, 3>(w, i + 3) += skew(spin) * skew(linear) - skew(acceleration);
-      jacobian_.block<3, 3>(w, w) += skew(spin);
-      jacobian_.block<3, 3>(w, w + 3) -= skew(linear);
-      jacobian_.block<3, 3>(i + 3, i + 3) = -0.5 * skew(spin);
-    } else if (s.group == Group::Planar) {
-      // As above, with one axis of rotation: J x = spin x.
-      const Eigen::Vector2d linear = v.segment<2>(i), acceleration = rate_.segment<2>(w);
-      const double spin = v[i + 2];
-      Eigen::Matrix2d turn;
-      turn << 0, -1, 1, 0;
-      jacobian_.block(nv_, i + 2, nv_ + nz_, 1) -=
-          (jacobian_.block(nv_, w, nv_ + nz_, 2) * (turn * linear)).eval();
-      jacobian_.block<2, 1>(w, i + 2) += turn * acceleration - spin * (turn * (turn * linear));
-      jacobian_.block<2, 2>(w, w) += spin * turn;
-      jacobian_.block<2, 1>(w, w + 2) += turn * linear;
-    }
+    const int n = s.linear, m = s.angular, i = s.index_v, a = i + n, w = nv_ + i;
+    const Mat3 spin = skew(s.angular_of(v)), linear = skew(s.linear_of(v));
+    // The body sees its linear velocity turn as it turns.
+    jacobian_.block(nv_, a, nv_ + nz_, m) +=
+        (jacobian_.block(nv_, w, nv_ + nz_, n) * linear.topRightCorner(n, m)).eval();
+    // The derivative of (rotation of a + spin x v) at u = 0, where the rotation's derivative is
+    // -[ . ]x.
+    jacobian_.block(w, a, n, m) +=
+        (spin * linear - skew(s.linear_of(rate_, nv_))).topRightCorner(n, m);
+    jacobian_.block(w, w, n, n) += spin.topLeftCorner(n, n);
+    jacobian_.block(w, nv_ + a, n, m) -= linear.topRightCorner(n, m);
+    jacobian_.block(a, a, m, m) = -0.5 * spin.bottomRightCorner(m, m);
   }
 }
 

@@ -1,8 +1,6 @@
 // Linearly implicit methods: one Jacobian and one factorization a step, no iteration.
 #pragma once
 
-#include <tuple>
-
 #include <Eigen/LU>
 
 #include "dynamics/integrators/stepper.hpp"
@@ -42,10 +40,9 @@ class ImplicitStepper : public Stepper {
 // One stage, order 1, L-stable: whatever the stiffness, a step of any size is stable.
 class LinearlyImplicitEuler : public ImplicitStepper {
  public:
-  static constexpr const char* kind = "linearly-implicit-euler";  // in files
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override;
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override;
   bool leaves_work() const override { return true; }
 };
 
@@ -53,12 +50,11 @@ class LinearlyImplicitEuler : public ImplicitStepper {
 // and Wanner, Solving Ordinary Differential Equations II, IV.7.
 class Rodas : public ImplicitStepper {
  public:
-  static constexpr const char* kind = "implicit";  // in files
   using ImplicitStepper::ImplicitStepper;
   void step(Chart& chart, double h, State& out) override;
   void complete(Chart& chart, State& out) override;
-  void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const override {
-    carry_along(slopes, chart, h, tangent);
+  void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const override {
+    carry_along(slopes, chart, h, changes);
   }
   int order_of_error() const override { return 4; }
   void interpolate(double theta, VectorX& y) const override;
@@ -70,8 +66,5 @@ class Rodas : public ImplicitStepper {
                                Vec3::Zero()};  // at the start, the middle and the end
   double h_ = 0;
 };
-
-// As ExplicitMethods.
-using ImplicitMethods = std::tuple<LinearlyImplicitEuler, Rodas>;
 
 }  // namespace sphshell

@@ -8,7 +8,6 @@
 namespace sphshell {
 
 class StepSlopes;
-struct Tangent;
 
 // An integration method: one step at a time, which may be repeated.
 class Stepper {
@@ -16,7 +15,10 @@ class Stepper {
   virtual ~Stepper() = default;
 
   // Moves on from the chart's origin by h. step() may be repeated with another h.
-  virtual void begin(Chart& chart) = 0;
+  virtual void begin(Chart& chart) {
+    chart.start(start_);
+    chart.rate_at_origin(rate_);
+  }
   virtual void step(Chart& chart, double h, State& out) = 0;
   // Once, after a step that is kept: what its end or its work still needs.
   virtual void complete(Chart& /*chart*/, State& /*out*/) {}
@@ -32,7 +34,7 @@ class Stepper {
   // y within the last step, at the share theta of it, or a little beyond.
   virtual void interpolate(double /*theta*/, VectorX& /*y*/) const {}
   // Moves changes of the origin to the end of the last step, of h.
-  virtual void carry(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const = 0;
+  virtual void carry(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const = 0;
   // True where the loop adds up the work of contacts, by the trapezoidal rule.
   virtual bool leaves_work() const { return false; }
   // True where no stiffness limits the step.
@@ -40,7 +42,7 @@ class Stepper {
 
  protected:
   // carry() of methods with a dense output, whose steps it follows to their tolerance.
-  void carry_along(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const;
+  void carry_along(StepSlopes& slopes, Chart& chart, double h, MatrixX& changes) const;
 
   VectorX start_, rate_, y_, error_;
 };

@@ -12,24 +12,21 @@ static std::unique_ptr<Stepper> make(SceneData& scene) {
     return std::make_unique<Method>();
 }
 
-// The method called `name`, or null, with the names of all.
-template <class... Methods>
-static std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::string& names,
-                                     const std::tuple<Methods...>*) {
-  std::unique_ptr<Stepper> out;
-  const auto look = [&](auto make_one, const char* kind) {
-    if (kind == name) out = make_one(scene);
-    names += (names.empty() ? "" : ", ") + std::string(kind);
-  };
-  (look(make<Methods>, Methods::kind), ...);
-  return out;
-}
+// A new method is its class and one line here, and a class of that kind in Python.
+static constexpr std::pair<const char*, std::unique_ptr<Stepper> (*)(SceneData&)> kMethods[] = {
+    {"semi-implicit-euler", make<SemiImplicitEuler>},
+    {"runge-kutta-4", make<RungeKutta4>},
+    {"adaptive", make<DormandPrince>},
+    {"linearly-implicit-euler", make<LinearlyImplicitEuler>},
+    {"implicit", make<Rodas>},
+};
 
 std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene) {
-  using All =
-      decltype(std::tuple_cat(std::declval<ExplicitMethods>(), std::declval<ImplicitMethods>()));
   std::string names;
-  if (auto found = find(integrator, scene, names, static_cast<const All*>(nullptr))) return found;
+  for (const auto& [name, make_one] : kMethods) {
+    if (name == integrator) return make_one(scene);
+    names += (names.empty() ? "" : ", ") + std::string(name);
+  }
   throw std::invalid_argument("integrator '" + std::string(integrator) +
                               "' does not exist; the table has: " + names);
 }

@@ -11,15 +11,10 @@
 namespace sphshell {
 
 // What is left of a run.
-struct Outcome {
+struct Outcome : Figures {
   Simulation::Status status = Simulation::Status::Running;  // if still so, it was stopped
   std::string fault;                                        // what a user's routine threw
   std::optional<DeepStart> deep_start;                      // it did not begin
-  double time = 0, last_step = 0, wall_time = 0;            // [s]
-  Counts counts;
-  VectorX q, v;
-  std::vector<PairSummary> summaries;
-  std::vector<LimitSummary> limits;
   Record record;
 };
 
@@ -115,14 +110,7 @@ class Rollout {
         out.fault = error.what();
       }
       out.record = run.take();
-      out.time = run.time();
-      out.last_step = run.last_step();
-      out.wall_time = run.wall_time();
-      out.counts = run.counts();
-      out.q = run.q();
-      out.v = run.v();
-      out.summaries = run.summaries();
-      out.limits = run.limits();
+      static_cast<Figures&>(out) = run.figures();
       lent = run.give_back();
     } catch (const std::exception& error) {
       out.fault = error.what();

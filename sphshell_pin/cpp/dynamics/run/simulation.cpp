@@ -13,17 +13,6 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Torques that sensors ask for leave no trace in the figures of the effort limits.
-class KeptCuts {
- public:
-  explicit KeptCuts(std::vector<char>& cuts) : cuts_(cuts), kept_(cuts) {}
-  ~KeptCuts() { cuts_ = std::move(kept_); }
-
- private:
-  std::vector<char>& cuts_;
-  std::vector<char> kept_;
-};
-
 }  // namespace
 
 Simulation::Simulation(const pinocchio::Model& model, Task task)
@@ -190,7 +179,8 @@ Simulation::Status Simulation::step() {
   } else {
     kink_ = kInfinity;
     if (!stepping_.fine() && stepping_.make_fixed(end)) {
-      if (sensitivities_) differentiate_step();
+      made_cut_ = cut_;
+      if (sensitivities_) sensitivities_->step(stepping_);
       accept();
     } else
       status = replace_fixed_step(end);
@@ -223,20 +213,13 @@ bool Simulation::make_controlled(double end) {
   // Sensors and rows within the step need its dense output, so they come before the step is
   // accepted.
   if (controller_) kink_ = controller_->next_kink(time());
-  switch (stepping_.make_controlled(end)) {
-    case Stepping::Made::Stuck:
-      return false;
-    case Stepping::Made::Nothing:
-      return true;
-    case Stepping::Made::Step:
-      break;
-  }
-  if (sensitivities_) differentiate_step();
+  const Stepping::Made made = stepping_.make_controlled(end);
+  if (made != Stepping::Made::Step) return made == Stepping::Made::Nothing;
+  made_cut_ = cut_;
+  // Before the step is accepted, as the scene must still know where it began.
+  if (sensitivities_) sensitivities_->step(stepping_);
   if (settings_.dt == 0) {
-    if (sensors_) {
-      const KeptCuts kept(cut_);
-      sensors_->add_dense(stepping_);
-    }
+    if (sensors_) sensors_->add_dense(stepping_);
     recorder_.add_rows(stepping_);
     ++steps_;
   }
@@ -245,27 +228,18 @@ bool Simulation::make_controlled(double end) {
   return true;
 }
 
-// Before the step is accepted, as the scene must still know where it began.
-void Simulation::differentiate_step() {
-  const KeptCuts kept(cut_);
-  sensitivities_->step(stepping_);
-}
-
-// Sensors, derivatives and recording see the step, each at its place in this order.
+// Sensors, derivatives and recording see the step, each at its place in this order. Torques that
+// they ask for leave no trace in the figures of the effort limits.
 void Simulation::accept() {
   const double before = time();
-  if (sensors_ && settings_.dt > 0) {
-    const KeptCuts kept(cut_);
-    sensors_->add_fixed(stepping_, settings_.dt);
-  }
+  if (sensors_ && settings_.dt > 0) sensors_->add_fixed(stepping_, settings_.dt);
   if (sensitivities_) {
-    const KeptCuts kept(cut_);
     const bool controlled = settings_.dt == 0 || stepping_.fine();
     sensitivities_->accept(stepping_.next(), controlled && stepping_.at_event());
   }
   stepping_.accept();
   recorder_.add_step(time(), time() - before);
-  recorder_.add_limits(v(), cut_, time(), time() - before);
+  recorder_.add_limits(v(), made_cut_, time(), time() - before);
   if (settings_.dt == 0) keep_state();
 }
 
@@ -284,15 +258,15 @@ void Simulation::hold_torques() {
   // First at the state itself: a controller may begin there.
   command(time(), q(), v());
   if (sensitivities_) {
-    const KeptCuts kept(cut_);
     const VectorX asked = tau_;
+    const std::vector<char> cut = cut_;
     sensitivities_->hold(
         [this](double t, const VectorX& q, const VectorX& v) -> const VectorX& {
           command(t, q, v);
           return tau_;
         },
         stepping_.state());
-    tau_ = asked;
+    tau_ = asked, cut_ = cut;
   }
   if (sensors_) sensors_->jump();
 }
@@ -306,7 +280,6 @@ void Simulation::record_torques() {
 const VectorX& Simulation::recorded_torques(const State& state) {
   const bool held = settings_.control_dt > 0;
   if (controller_ && !held) {
-    const KeptCuts kept(cut_);
     command(std::min(state.t, std::nextafter(kink_, -kInfinity)), state.q, state.v);
   } else if (controller_ && controls_ == 0) {
     tau_.setConstant(std::numeric_limits<double>::quiet_NaN());

@@ -41,6 +41,15 @@ struct Counts {
   long event_queries = 0;  // of the contacts alone, to locate events on the dense output
 };
 
+// What a run tells of itself at any time.
+struct Figures {
+  double time = 0, last_step = 0, wall_time = 0;  // wall_time: spent in advance() [s]
+  Counts counts;
+  VectorX q, v;
+  std::vector<PairSummary> summaries;  // of the pairs, then of the joints' stops
+  std::vector<LimitSummary> limits;    // of the velocities (nv), where there are any
+};
+
 // What a run uses and others may share, such as a user's routine.
 struct Lent {
   std::vector<Pair> pairs;
@@ -106,16 +115,17 @@ class Simulation : private Torques {
   double time() const { return stepping_.state().t; }
   const VectorX& q() const { return stepping_.state().q; }
   const VectorX& v() const { return stepping_.state().v; }
-  Counts counts() const {
-    return {steps_, stepping_.rejected(), stepping_.event_steps(), stepping_.evaluations(),
-            stepping_.event_queries()};
+  Figures figures() const {
+    return {time(),
+            stepping_.proposal(),
+            wall_time_,
+            {steps_, stepping_.rejected(), stepping_.event_steps(), stepping_.evaluations(),
+             stepping_.event_queries()},
+            q(),
+            v(),
+            recorder_.summaries(),
+            recorder_.limits()};
   }
-  double last_step() const { return stepping_.proposal(); }  // [s]
-  double wall_time() const { return wall_time_; }            // spent in advance() [s]
-  // Of the pairs, then of the joints' stops.
-  const std::vector<PairSummary>& summaries() const { return recorder_.summaries(); }
-  // Of the velocities (nv), where effort or speed has a limit; else none.
-  const std::vector<LimitSummary>& limits() const { return recorder_.limits(); }
   const pinocchio::Model& model() const { return scene_.body().model(); }
   const std::vector<Pair>& pairs() const { return scene_.pairs(); }
   const Controller* controller() const { return controller_.get(); }
@@ -136,7 +146,6 @@ class Simulation : private Torques {
   Status step();
   Status replace_fixed_step(double end);
   bool make_controlled(double end);
-  void differentiate_step();
   void accept();
   void hold_torques();
   const VectorX& recorded_torques(const State& state);
@@ -155,7 +164,8 @@ class Simulation : private Torques {
   std::unique_ptr<Sensors> sensors_;              // null where there are none
   std::unique_ptr<Sensitivities> sensitivities_;  // null unless asked for
   VectorX tau_;
-  std::vector<char> cut_;  // torques that were cut to their limit, when last computed
+  std::vector<char> cut_;       // torques that were cut to their limit, when last computed
+  std::vector<char> made_cut_;  // and in the step that was made
   long grid_ = 0, grid_steps_ = 0,
        steps_ = 0;      // of the fixed step: which it is, how many there are
   int fine_steps_ = 0;  // made of the fixed step under way

@@ -22,12 +22,10 @@ void find_curved(const pinocchio::JointModel& joint, std::vector<CurvedSegment>&
     for (const auto& part : whole->joints) find_curved(part, out);
     return;
   }
-  const std::string kind = joint.shortname();
-  using Group = CurvedSegment::Group;
-  const auto add = [&](Group group) { out.push_back({group, joint.idx_v(), joint.idx_q()}); };
-  if (kind == "JointModelFreeFlyer") add(Group::Rigid);
-  if (kind == "JointModelSpherical") add(Group::Rotation);
-  if (kind == "JointModelPlanar") add(Group::Planar);
+  for (const auto& [kind, linear, angular] : {std::tuple("JointModelFreeFlyer", 3, 3),
+                                              {"JointModelSpherical", 0, 3},
+                                              {"JointModelPlanar", 2, 1}})
+    if (joint.shortname() == kind) out.push_back({linear, angular, joint.idx_v(), joint.idx_q()});
 }
 
 // Of one joint, as Pinocchio takes them one after the other: its placement and velocity; its axes.
@@ -336,12 +334,8 @@ void Multibody::sizes(const VectorX& q, VectorX& out) const {
     if (joint.nq() == joint.nv())
       out.segment(joint.idx_v(), joint.nv()) = q.segment(joint.idx_q(), joint.nq()).cwiseAbs();
   }
-  for (const CurvedSegment& s : curved_) {
-    if (s.group == CurvedSegment::Group::Rigid)
-      out.segment<3>(s.index_v).setConstant(q.segment<3>(s.index_q).norm());
-    if (s.group == CurvedSegment::Group::Planar)
-      out.segment<2>(s.index_v).setConstant(q.segment<2>(s.index_q).norm());
-  }
+  for (const CurvedSegment& s : curved_)
+    out.segment(s.index_v, s.linear).setConstant(q.segment(s.index_q, s.linear).norm());
 }
 
 void Multibody::speeds(const VectorRef& v, VectorX& out) const {
@@ -351,8 +345,8 @@ void Multibody::speeds(const VectorRef& v, VectorX& out) const {
     out.segment(i, n).setConstant(v.segment(i, n).norm());
   };
   for (const CurvedSegment& s : curved_) {
-    together(s.index_v, s.group == CurvedSegment::Group::Planar ? 2 : 3);
-    if (s.group == CurvedSegment::Group::Rigid) together(s.index_v + 3, 3);
+    together(s.index_v, s.linear);
+    together(s.index_v + s.linear, s.angular);
   }
 }
 

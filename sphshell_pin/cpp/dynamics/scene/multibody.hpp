@@ -16,10 +16,24 @@ using VectorRef = Eigen::Ref<const VectorX>;
 using Forces = std::vector<pinocchio::Force>;
 
 // A segment of the velocity whose group does not commute: its composition needs a correction in
-// Runge-Kutta methods of order 3 and more.
+// Runge-Kutta methods of order 3 and more. Of a position it has `linear` numbers, then of a
+// rotation `angular` ones: 3 and 3, 2 and 1 in the plane, 0 and 3 of a rotation alone.
 struct CurvedSegment {
-  enum class Group { Rotation, Planar, Rigid } group;
+  int linear, angular;
   int index_v, index_q;
+
+  // Its parts of what has a velocity's numbers from `first` on, as vectors in space: the plane is
+  // z = 0.
+  Eigen::Vector3d linear_of(const VectorRef& x, int first = 0) const {
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    out.head(linear) = x.segment(first + index_v, linear);
+    return out;
+  }
+  Eigen::Vector3d angular_of(const VectorRef& x, int first = 0) const {
+    Eigen::Vector3d out = Eigen::Vector3d::Zero();
+    out.tail(angular) = x.segment(first + index_v + linear, angular);
+    return out;
+  }
 };
 
 // A joint whose axes turn in its own frame as it moves: composite, universal, spherical ZYX, ...

@@ -1,6 +1,7 @@
 // Where a sphere touches a shell, without a robot.
 #pragma once
 
+#include "sphshell_pin/owned.hpp"
 #include "sphshell_pin/shell.hpp"
 
 namespace sphshell_pin {
@@ -35,11 +36,6 @@ struct ClosestPoint {
 class SPHSHELL_PIN_API Query {
  public:
   Query();
-  Query(const Query& other);
-  Query& operator=(const Query& other);
-  Query(Query&&) noexcept;
-  Query& operator=(Query&&) noexcept;
-  ~Query();
 
   /// Every place where a sphere touches, deepest first; valid until the next call.
   /// @param center of the sphere, in the shell's frame [m]
@@ -61,7 +57,7 @@ class SPHSHELL_PIN_API Query {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  Owned<Impl> impl_;
 };
 
 }  // namespace sphshell_pin

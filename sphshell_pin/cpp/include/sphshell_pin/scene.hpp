@@ -44,11 +44,6 @@ class SPHSHELL_PIN_API Scene {
   /// @throws InvalidParameter for a model that Pinocchio's algorithms would not survive: parents
   ///         after their joints, lists of different lengths, numbers that are not finite
   explicit Scene(const pinocchio::Model& model);
-  Scene(const Scene& other);
-  Scene& operator=(const Scene& other);
-  Scene(Scene&&) noexcept;
-  Scene& operator=(Scene&&) noexcept;
-  ~Scene();
 
   /// Lets `sphere` touch `shell`; returns the number of the pair, from 0.
   /// @throws FrameNotFound on a frame that the model does not have, with a list of those it has
@@ -78,7 +73,7 @@ class SPHSHELL_PIN_API Scene {
   const Impl& impl() const { return *impl_; }
 
  private:
-  std::unique_ptr<Impl> impl_;
+  Owned<Impl> impl_;
 };
 
 /// What a scene answers along a motion that your own loop makes, as pinocchio::Data is the scratch
@@ -88,11 +83,6 @@ class SPHSHELL_PIN_API SceneState {
  public:
   /// Begins at its first advance(). Pairs that the scene gets later are not in it.
   explicit SceneState(const Scene& scene);
-  SceneState(const SceneState& other);
-  SceneState& operator=(const SceneState& other);
-  SceneState(SceneState&&) noexcept;
-  SceneState& operator=(SceneState&&) noexcept;
-  ~SceneState();
 
   /// The wrenches of all contacts, for pinocchio::aba(model, data, q, v, tau, forces): one per
   /// joint, in the joint's frame about its origin. Valid until the next call.
@@ -133,7 +123,7 @@ class SPHSHELL_PIN_API SceneState {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  Owned<Impl> impl_;
 };
 
 }  // namespace sphshell_pin
