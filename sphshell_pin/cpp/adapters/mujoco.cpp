@@ -3,7 +3,6 @@
 #include <exception>
 
 namespace sphshell {
-namespace {
 
 using Eigen::Map;
 using Vec3Map = Map<const Vec3>;
@@ -11,11 +10,9 @@ using Vec3Map = Map<const Vec3>;
 constexpr int kRungeKutta4 = 1;  // mjINT_RK4
 
 // The array whose pointer a struct keeps at `offset`.
-const double* array_at(const void* from, std::size_t offset) {
+static const double* array_at(const void* from, std::size_t offset) {
   return value_at<const double*>(from, offset);
 }
-
-}  // namespace
 
 template <class Work>
 void MujocoContacts::report_faults(const Work& work) {

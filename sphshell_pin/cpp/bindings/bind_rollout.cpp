@@ -8,10 +8,8 @@
 
 using namespace sphshell;
 
-namespace {
-
 // Energy stored and lost less the controller's work, from the first row to the last [J].
-double residual(const std::vector<double>& energy) {
+static double residual(const std::vector<double>& energy) {
   constexpr int n = Record::kEnergies;
   if (energy.empty()) return 0;
   double sum = 0;
@@ -21,14 +19,12 @@ double residual(const std::vector<double>& energy) {
 }
 
 // The pairs whose sphere went through their shell.
-nb::list through(const Outcome& outcome) {
+static nb::list through(const Outcome& outcome) {
   nb::list pairs;
   for (const Event& event : outcome.record.events)
     if (event.kind == Event::Kind::Through) pairs.append(event.pair);
   return pairs;
 }
-
-}  // namespace
 
 void bind_rollout(nb::module_& m) {
   // What a run of a rollout leaves behind; its record is converted only when it is asked for.

@@ -362,8 +362,6 @@ void bind_shell(nb::module_& m) {
   array("edge_class", [](const Shell& s) {
     return per_edge(s, [](const Edge& e) { return static_cast<std::uint8_t>(e.kind); });
   });
-  array("edge_angle", [](const Shell& s) {
-    return per_edge(
-        s, [&](const Edge& e) { return s.topology().angle(s.vertices(), s.triangles(), e); });
-  });
+  array("edge_angle",
+        [](const Shell& s) { return per_edge(s, [&](const Edge& e) { return s.angle(e); }); });
 }

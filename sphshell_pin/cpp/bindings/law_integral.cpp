@@ -3,14 +3,11 @@
 #include "contact/laws/gauss.hpp"
 
 namespace sphshell {
-namespace {
 
 constexpr double kFirst = 0x1p-20;    // where the octaves begin: a depth of 1e-12 m [m^0.5]
 constexpr double kTolerance = 1e-11;  // of an interval, as a share of the energy so far
 constexpr int kMostHalvings = 24;
 constexpr int kMostJumps = 1000;  // noise has one everywhere: then no interval is halved any more
-
-}  // namespace
 
 // The rule is exact for a sum of powers of the depth, halves among them, up to the seventh.
 double LawIntegral::gauss(double from, double to, const double* parameters) const {

@@ -139,7 +139,7 @@ void Shell::build_cones() {
       if (facet.owned.vertex[k] >= 0)
         tangent = std::max(tangent, tan_vertex_cone(facet.owned.vertex[k], facet.normal));
     }
-    const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
+    const Vec3 middle = facet.middle();
     double reach = 0;
     for (const Vec3& corner : facet.corner) reach = std::max(reach, (corner - middle).norm());
     NormalCone& cone = cones_[f];
@@ -151,6 +151,17 @@ void Shell::build_cones() {
     cone.reach = static_cast<float>(reach + 1e-6 * size_);
     cone.tan_opening = widened_opening(tangent);
   });
+}
+
+// Positive where the surface is convex: the far corner of the second triangle is below the plane of
+// the first.
+double Shell::angle(const Edge& edge) const {
+  if (edge.count != 2 || edge.kind == EdgeClass::NonManifold) return 0;
+  const auto [h, g] = topology_.half_edges(edge);
+  const Vec3& m = topology_.face_normal[triangle_of(h)];
+  const double angle = angle_between(m, topology_.face_normal[triangle_of(g)]);
+  const Vec3& far = point(corner_before(g));
+  return (far - vertices_[edge.first_vertex]).dot(m) <= 0 ? angle : -angle;
 }
 
 SurfacePoint Shell::closest_point(const Vec3& point) const {

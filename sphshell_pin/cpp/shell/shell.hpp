@@ -30,6 +30,9 @@ struct alignas(64) Facet {
   Owned owned;
   int planar_face;  // facets of one planar face touch once
   int element;
+
+  Vec3 side(int k) const { return corner[next_corner(k)] - corner[k]; }
+  Vec3 middle() const { return (corner[0] + corner[1] + corner[2]) / 3; }
 };
 static_assert(sizeof(Facet) == 128);
 
@@ -90,6 +93,19 @@ class Shell {
   const std::vector<Vec3>& vertices() const { return vertices_; }
   const std::vector<Triangle>& triangles() const { return triangles_; }
   const std::vector<int>& element() const { return element_; }
+  // The vertex at a corner (3 triangle + k), where a half-edge begins, and its place.
+  int vertex(int corner) const { return triangles_[triangle_of(corner)][side_of(corner)]; }
+  const Vec3& point(int corner) const { return vertices_[vertex(corner)]; }
+  std::array<Vec3, 3> corners(int triangle) const {
+    const Triangle& t = triangles_[triangle];
+    return {vertices_[t[0]], vertices_[t[1]], vertices_[t[2]]};
+  }
+  // From there to the end of the half-edge.
+  Vec3 along(int half_edge) const { return point(corner_after(half_edge)) - point(half_edge); }
+  // Whether two half-edges of an edge run against each other, as those of triangles wound alike do.
+  bool opposed(int h, int g) const { return vertex(h) != vertex(g); }
+  // Between the two normals of an edge [rad], > 0 convex, < 0 concave, 0 where not manifold.
+  double angle(const Edge& edge) const;
   const Topology& topology() const { return topology_; }
   const Bvh& bvh() const { return bvh_; }
   const LargeArray<Facet>& facets() const { return facets_; }

@@ -74,7 +74,7 @@ void build_planar_faces(const std::vector<Vec3>& vertices, const std::vector<Tri
   DisjointSets sets(triangles.size());
   for (Edge& edge : out.edges) {
     if (edge.count != 2) continue;
-    const int h = out.incidence[edge.begin], g = out.incidence[edge.begin + 1];
+    const auto [h, g] = out.half_edges(edge);
     const int t = triangle_of(h), u = triangle_of(g);
     edge.inner = element[t] == element[u];
     const bool same_direction =
@@ -124,7 +124,7 @@ void classify_edges(const std::vector<Triangle>& triangles, double crease_angle,
       edge.kind = EdgeClass::NonManifold;
       continue;
     }
-    const int h = out.incidence[edge.begin], g = out.incidence[edge.begin + 1];
+    const auto [h, g] = out.half_edges(edge);
     const int t = triangle_of(h), u = triangle_of(g);
     if (triangles[t][side_of(h)] == triangles[u][side_of(g)]) {
       edge.kind = EdgeClass::NonManifold;  // no common orientation (a Moebius strip's seam)
@@ -227,18 +227,6 @@ Eigen::AlignedBox3d bounds(const std::vector<Vec3>& vertices,
   for (const Triangle& t : triangles)
     for (int v : t) box.extend(vertices[v]);
   return box;
-}
-
-// Positive where the surface is convex: the far corner of the second triangle is below the plane of
-// the first.
-double Topology::angle(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-                       const Edge& edge) const {
-  if (edge.count != 2 || edge.kind == EdgeClass::NonManifold) return 0;
-  const int h = incidence[edge.begin], g = incidence[edge.begin + 1];
-  const Vec3& m = face_normal[triangle_of(h)];
-  const Vec3& far = vertices[triangles[triangle_of(g)][previous_corner(side_of(g))]];
-  const double angle = angle_between(m, face_normal[triangle_of(g)]);
-  return (far - vertices[edge.first_vertex]).dot(m) <= 0 ? angle : -angle;
 }
 
 const Pinch* Topology::pinch_at(int vertex) const {

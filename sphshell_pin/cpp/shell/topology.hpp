@@ -130,6 +130,15 @@ struct Topology {
   const Pinch* pinch_at(int vertex) const;
 
   const Edge& edge_at(int half_edge) const { return edges[edge_of[half_edge]]; }
+  // The half-edges of an edge that has two.
+  std::pair<int, int> half_edges(const Edge& edge) const {
+    return {incidence[edge.begin], incidence[edge.begin + 1]};
+  }
+  // The triangle across a half-edge, at an edge of two; else -1.
+  int neighbor(int h) const {
+    const int other = other_half_edge(h);
+    return other < 0 ? -1 : triangle_of(other);
+  }
   // The other one of an edge with two half-edges, else -1.
   int other_half_edge(int h) const {
     const Edge& edge = edge_at(h);
@@ -142,10 +151,6 @@ struct Topology {
     for (int i = 0; i < edge.count; ++i) sum += face_normal[triangle_of(incidence[edge.begin + i])];
     return sum;
   }
-
-  // Between the two normals of an edge [rad], > 0 convex, < 0 concave, 0 where not manifold.
-  double angle(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,
-               const Edge& edge) const;
 
   // crease_angle [rad]; triangles of one element are contiguous in `element`.
   Topology(const std::vector<Vec3>& vertices, const std::vector<Triangle>& triangles,

@@ -32,7 +32,7 @@ double weight_of(double t2) {
 }
 
 double chord_distance2(const Facet& facet, int side, const Vec3& x) {
-  const Vec3 &p = facet.corner[side], d = facet.corner[next_corner(side)] - p;
+  const Vec3 &p = facet.corner[side], d = facet.side(side);
   const double t = std::clamp((x - p).dot(d) / d.squaredNorm(), 0.0, 1.0);
   return (p + t * d - x).squaredNorm();
 }

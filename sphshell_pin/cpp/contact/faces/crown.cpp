@@ -3,7 +3,6 @@
 #include "contact/faces/shares.hpp"
 
 namespace sphshell {
-namespace {
 
 constexpr double kRadius = 1e3;  // R over the size of the shell
 constexpr double kRidge = 1e-4;  // e over its square
@@ -12,13 +11,11 @@ constexpr double kOn = 1e-7;     // what lies on a face, as a share of the size
 const Vec3 kUp = Vec3::UnitZ();
 
 // Of a point that the shell carries, by its displacement.
-Matrix36 carried(const Vec3& point) {
+static Matrix36 carried(const Vec3& point) {
   Matrix36 out;
   out << Mat3::Identity(), -cross_matrix(point);
   return out;
 }
-
-}  // namespace
 
 double SharedContact::spread() const {
   double sum = 0;

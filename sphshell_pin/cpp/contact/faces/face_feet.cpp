@@ -6,7 +6,6 @@
 #include "contact/query/closest_on_side.hpp"
 
 namespace sphshell {
-namespace {
 
 // Nearer to an axis than this share of the radius, a center has no direction.
 constexpr double kOnAxis = 1e-12;
@@ -14,8 +13,6 @@ constexpr int kMostRepeats = 20;
 // Faces that cross at less than this (sine) overlap as if it were this: the gap times it is the
 // rounding of a distance, below which its sign says nothing.
 constexpr double kLeastSlope = 1e-7;
-
-}  // namespace
 
 // The facets near the point are looked through; where it may be anywhere around an axis, those near
 // the sphere, and towards each of them.
@@ -108,13 +105,11 @@ void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool wa
   minima.push_back({contact, f, 0, cell.sign < 0});
 }
 
-namespace {
-
 // Whether a point is on the inner side of what bounds a facet on its side k. Inner: facets of a
 // face are divided by straight lines of its parameters, those of planes and spheres by the planes
 // through their chords and the face's normals. Border: by what divides the joint's faces. Cubic: by
 // the curve itself.
-bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tolerance) {
+static bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Facet& facet = shell.facets()[f];
@@ -145,8 +140,6 @@ bool is_inside(const Shell& shell, int f, int k, const FacePoint& at, double tol
            -tolerance);
 }
 
-}  // namespace
-
 bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
@@ -157,12 +150,12 @@ bool holds(const Shell& shell, int f, const FacePoint& at, double tolerance) {
   // Beyond the corner of a needle both of its lines may be nearer than the tolerance.
   if (surface.faces().shapes[cell.face].kind == FaceKind::Plane)
     for (int k = 0; k < 3; ++k) {
-      const Vec3* corner = shell.facets()[f].corner;
+      const Facet& facet = shell.facets()[f];
       const int before = previous_corner(k);
       if (cell.side[k] != FaceCell::Side::Inner || cell.side[before] != FaceCell::Side::Inner)
         continue;
-      const Vec3 from = at.point - corner[k];
-      const Vec3 ahead = corner[next_corner(k)] - corner[k], back = corner[before] - corner[k];
+      const Vec3 from = at.point - facet.corner[k], ahead = facet.side(k),
+                 back = facet.corner[before] - facet.corner[k];
       if (from.dot(ahead) >= 0 && from.dot(back) >= 0) continue;
       if (from.dot(ahead.normalized() + back.normalized()) < -tolerance) return false;
     }
@@ -389,7 +382,7 @@ Vec3 inward(const Shell& shell, int h, double t, const Vec3& point, const Vec3& 
     face->distance(point, n);
     // The facet's own normal leans any way where its chords leave the tube of a torus.
     in = surface.face_cells()[f].sign * n.cross(along);
-    if (along.dot(facet.corner[next_corner(k)] - facet.corner[k]) < 0) in = -in;
+    if (along.dot(facet.side(k)) < 0) in = -in;
   } else {
     in = surface.facets()[f].patch(facet).inward(k, t);
   }

@@ -4,12 +4,12 @@
 #include "contact/query/tolerances.hpp"
 
 namespace sphshell {
-namespace {
 
 // What one quadrature point adds: x relative to the center, `area` its area vector.
 // p = (R^2 - rho^2) / (2 rho) over kappa; the energy by the divergence theorem is an integral over
 // the surface as well, see FoundationSum.
-void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes, FoundationSum& sum) {
+static void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes,
+                      FoundationSum& sum) {
   const double rho2 = x.squaredNorm(), over = 1 / std::sqrt(rho2), inside = radius2 - rho2;
   const double p = inside * over / 2, size = area.norm();
   sum.force += p * area;
@@ -22,15 +22,13 @@ void add_point(const Vec3& x, const Vec3& area, double radius2, bool slopes, Fou
 }
 
 // A triangle as a cubic patch, so that one quadrature serves both.
-CubicPatch flat_patch(const Vec3 (&corner)[3]) {
+static CubicPatch flat_patch(const Vec3 (&corner)[3]) {
   CubicPatch out;
   for (Vec3* c : {&out.c20, &out.c11, &out.c02, &out.c30, &out.c21, &out.c12, &out.c03})
     c->setZero();
   out.c00 = corner[0], out.c10 = corner[1] - corner[0], out.c01 = corner[2] - corner[0];
   return out;
 }
-
-}  // namespace
 
 Vec3 FoundationRow::normal() const {
   const double length = sum.force.norm();

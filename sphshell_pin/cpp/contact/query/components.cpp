@@ -217,8 +217,7 @@ void Components::add_candidates(const Shell& shell, const Probe& probe, int f, i
     const int beyond = bounds.beyond[k];
     if (beyond == kBoundary || (beyond >= 0 && belongs_to(triangle_of(beyond), component)))
       continue;
-    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-    const double bound = probe.bound_along(facet.corner[k], d, bounds.bulge);
+    const double bound = probe.bound_along(facet.corner[k], facet.side(k), bounds.bulge);
     if (bound <= 0) continue;
     // A side is seen from the first of its triangles, so that a point has one name.
     const auto add_candidate = [&](int h, int name) {

@@ -114,7 +114,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   double length2[3], across[3];  // across: of the center, from side k inward, times its length
   bool near_side[3];
   for (int k = 0; k < 3; ++k) {
-    edge[k] = at.corner[next_corner(k)] - at.corner[k];
+    edge[k] = at.side(k);
     across[k] = at.normal.dot(edge[k].cross(sphere.center - at.corner[k]));
     length2[k] = edge[k].squaredNorm();
     // Beyond side k by more than the lean: the element holds no minimum at all.
@@ -124,8 +124,7 @@ CurvedQuery::Outlook::Outlook(int f, const Facet& at, const NormalCone& cone,
   }
   // Half the square of the distance falls towards `descent` in the middle, and elsewhere by what
   // differs from it no more than its second derivative makes of the way there.
-  const Vec3 middle = (at.corner[0] + at.corner[1] + at.corner[2]) / 3;
-  const Vec3 aside = sphere.center - middle - height * at.normal;
+  const Vec3 aside = sphere.center - at.middle() - height * at.normal;
   // How far the element's middle is from that of its flat facet.
   const Vec3 offset(bounds.offset[0], bounds.offset[1], bounds.offset[2]);
   const double raised = offset.dot(at.normal), size = aside.norm(), reach = cone.reach;
@@ -259,8 +258,8 @@ void CurvedQuery::add_border(const Task<Probe>& task, int f) {
     if (owned.twin[k] == kNotOwned) continue;
     if (sphere && (cell.side[k] == FaceCell::Side::Inner || is_on_joint(*shell.curved(), f, k)))
       continue;
-    const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
-    if (probe.bound_along(facet.corner[k], d, double(cell.bulge[k])) > 0) add_edge(task, f, k);
+    if (probe.bound_along(facet.corner[k], facet.side(k), double(cell.bulge[k])) > 0)
+      add_edge(task, f, k);
   }
 }
 

@@ -6,12 +6,11 @@
 #include "contact/query/regions.hpp"
 
 namespace sphshell {
-namespace {
 
 // Whether a minimum is found at a vertex, on a triangle that one of a fan's corners belongs to.
 // tolerance [m]: how far from the vertex the minimum may be.
-bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int vertex,
-                 const std::vector<int>& fan, double tolerance) {
+static bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int vertex,
+                        const std::vector<int>& fan, double tolerance) {
   return std::any_of(minima.begin(), minima.end(), [&](const Minimum& at) {
     const Vec3 away = at.contact.point - shell.vertices()[vertex];
     const int t = shell.triangle_of_facet(at.facet);
@@ -19,8 +18,6 @@ bool has_minimum(const Shell& shell, const std::vector<Minimum>& minima, int ver
            std::any_of(fan.begin(), fan.end(), [t](int c) { return triangle_of(c) == t; });
   });
 }
-
-}  // namespace
 
 FlatQuery::FlatQuery() {
   // Usual numbers, so that first queries do not grow them one by one.
@@ -73,7 +70,7 @@ void FlatQuery::find_features(const Shell& shell, const Sphere& sphere,
       if (facet.owned.twin[k] != kNotOwned && side[k].not_within && !side[k].past_first &&
           !side[k].past_second) {
         const Vec3& a = facet.corner[k];
-        if (sphere.reaches(a + side[k].t * (facet.corner[next_corner(k)] - a)) &&
+        if (sphere.reaches(a + side[k].t * facet.side(k)) &&
             edge_is_minimum(shell, facet.owned.twin[k], center, tolerance2)) {
           const Triangle& t = shell.triangles()[shell.triangle_of_facet(f)];
           edges_.push_back({f, k, t[k], t[next_corner(k)]});
@@ -151,7 +148,7 @@ void FlatQuery::add_minima(const Shell& shell, const Sphere& sphere, bool want_d
   for (const OnEdge& on : edges_) {
     const Facet& facet = facets[on.facet];
     const Vec3& a = facet.corner[on.side];
-    const Vec3 along = facet.corner[next_corner(on.side)] - a;
+    const Vec3 along = facet.side(on.side);
     const double t = std::clamp((center - a).dot(along) / along.squaredNorm(), 0.0, 1.0);
     add(on.facet, on.side,
         contact_at(a + t * along, facet.normal, sphere, facet.element, Feature::Edge), false,

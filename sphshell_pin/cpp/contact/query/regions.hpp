@@ -17,7 +17,7 @@ struct SideTest {
 // The sums are left multiplied by the side's length, and compared squared: no root and no division
 // is needed. tolerance2: square of the round-off of a coordinate [m^2].
 inline SideTest test_side(const Facet& facet, int k, const Vec3& center, double tolerance2) {
-  const Vec3 edge = facet.corner[next_corner(k)] - facet.corner[k];
+  const Vec3 edge = facet.side(k);
   const Vec3 from = center - facet.corner[k];
   const double length2 = edge.squaredNorm();
   const double slack2 = tolerance2 * length2;
@@ -68,12 +68,10 @@ inline bool vertex_is_minimum(const Shell& shell, int vertex, const Vec3& center
 // The same among the triangles of one fan (corners 3 triangle + k) alone.
 inline bool fan_is_minimum(const Shell& shell, const std::vector<int>& fan, const Vec3& center,
                            double tolerance) {
-  const std::vector<Vec3>& p = shell.vertices();
   return std::all_of(fan.begin(), fan.end(), [&](int c) {
-    const Triangle& t = shell.triangles()[triangle_of(c)];
-    const Vec3 &at = p[t[side_of(c)]], from = center - at;
-    return rises_along(p[t[next_corner(side_of(c))]] - at, from, tolerance) &&
-           rises_along(p[t[previous_corner(side_of(c))]] - at, from, tolerance);
+    const Vec3 &at = shell.point(c), from = center - at;
+    return rises_along(shell.along(c), from, tolerance) &&
+           rises_along(shell.point(corner_before(c)) - at, from, tolerance);
   });
 }
 

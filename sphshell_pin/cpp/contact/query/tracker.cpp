@@ -1,7 +1,6 @@
 #include "contact/query/tracker.hpp"
 
 namespace sphshell {
-namespace {
 
 // The center can pass a sheet within a step only from deeper than this share of the radius: a step
 // moves it by a quarter of the radius at most.
@@ -10,8 +9,6 @@ constexpr double kDeep = 0.5;
 // Longer lists, which only a contact source gives, go on by their order: all pairs would be too
 // many.
 constexpr std::size_t kLongest = 1000;
-
-}  // namespace
 
 ContactTracker::ContactTracker() {
   for (auto* list : {&places_, &next_}) list->reserve(64);

@@ -13,7 +13,6 @@
 #include "dynamics/scene/multibody.hpp"
 
 namespace sphshell {
-namespace {
 
 // To be raised where the functions of the object change.
 constexpr int kInterface = 1;
@@ -23,14 +22,12 @@ constexpr int kStates = 5;
 
 // Largest difference, of the largest number; not a number where one answer is none.
 template <class A, class B>
-double relative_difference(const A& answer, const B& judge) {
+static double relative_difference(const A& answer, const B& judge) {
   const double scale = judge.size() ? judge.cwiseAbs().maxCoeff() : 0;
   const double off =
       judge.size() ? (answer - judge).cwiseAbs().template maxCoeff<Eigen::PropagateNaN>() : 0;
   return off == 0 ? 0 : off / scale;
 }
-
-}  // namespace
 
 CompiledRobot::CompiledRobot(const std::string& path, const pinocchio::Model& model)
     : object_(dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL)), path_(path) {

@@ -5,11 +5,10 @@
 #include "dynamics/integrators/implicit.hpp"
 
 namespace sphshell {
-namespace {
 
 using Changes = StepSlopes::Coordinates;
 
-void add(Changes& to, double share, const Changes& rates) {
+static void add(Changes& to, double share, const Changes& rates) {
   to.u += share * rates.u;
   to.w += share * rates.w;
   to.z += share * rates.z;
@@ -17,7 +16,7 @@ void add(Changes& to, double share, const Changes& rates) {
 
 // The differences to both sides: alike where the slopes are smooth. Where a kink is on one side, as
 // a touch within what is differenced, that of the other side.
-MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& after) {
+static MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& after) {
   constexpr double kAlike = 3;
   return (here - before).binaryExpr(after - here, [](double back, double on) {
     if (std::abs(on) > kAlike * std::abs(back)) return back;
@@ -25,8 +24,6 @@ MatrixX beside_kinks(const MatrixX& before, const MatrixX& here, const MatrixX& 
     return 0.5 * (back + on);
   });
 }
-
-}  // namespace
 
 // Along the dense output, which solves the same equations to their tolerance.
 void Stepper::carry_along(StepSlopes& slopes, Chart& chart, double h, Tangent& tangent) const {

@@ -1,7 +1,6 @@
 #include "dynamics/derivatives/sensitivities.hpp"
 
 namespace sphshell {
-namespace {
 
 // A contact that begins at the end of a step is not deeper there than by this share of its motion.
 constexpr double kJustBegun = 1e-2;
@@ -11,12 +10,10 @@ constexpr double kStretchDifference = 1e-4;
 // changes there at least, where it jumps, relative to its size and to the velocity over 1 s.
 constexpr double kBefore = 1 - 1e-5, kJump = 1e-3;
 
-void append(std::vector<double>& to, const MatrixX& rows) {
+static void append(std::vector<double>& to, const MatrixX& rows) {
   for (Eigen::Index i = 0; i < rows.rows(); ++i)
     for (Eigen::Index k = 0; k < rows.cols(); ++k) to.push_back(rows(i, k));
 }
-
-}  // namespace
 
 Sensitivities::Sensitivities(SceneData& scene, SensitivitySettings settings)
     : scene_(scene), slopes_(scene, std::move(settings.parameters)) {

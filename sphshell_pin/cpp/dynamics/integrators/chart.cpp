@@ -1,13 +1,12 @@
 #include "dynamics/integrators/chart.hpp"
 
 namespace sphshell {
-namespace {
 
 using Group = CurvedSegment::Group;
 using Vec2 = Eigen::Vector2d;
 
 // The rate of u where exp(u) turns with the angular velocity w, in turning axes.
-Vec3 angle_rate(const Vec3& u, const Vec3& w) {
+static Vec3 angle_rate(const Vec3& u, const Vec3& w) {
   // u' = w + [u, w] / 2 + c [u, [u, w]], c = (1 - |u| / 2 cot(|u| / 2)) / |u|^2, by its series near
   // zero.
   const double a2 = u.squaredNorm();
@@ -16,8 +15,6 @@ Vec3 angle_rate(const Vec3& u, const Vec3& w) {
   const Vec3 once = u.cross(w);
   return w + 0.5 * once + c * u.cross(once);
 }
-
-}  // namespace
 
 Eigen::Matrix3d rotation_of(const Vec3& angle) {
   const double a = angle.norm();

@@ -2,10 +2,9 @@
 #include "dynamics/integrators/implicit.hpp"
 
 namespace sphshell {
-namespace {
 
 template <class Method>
-std::unique_ptr<Stepper> make(SceneData& scene) {
+static std::unique_ptr<Stepper> make(SceneData& scene) {
   // Implicit methods linearize the scene and are made for it.
   if constexpr (std::is_constructible_v<Method, SceneData&>)
     return std::make_unique<Method>(scene);
@@ -15,8 +14,8 @@ std::unique_ptr<Stepper> make(SceneData& scene) {
 
 // The method called `name`, or null, with the names of all.
 template <class... Methods>
-std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::string& names,
-                              const std::tuple<Methods...>*) {
+static std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::string& names,
+                                     const std::tuple<Methods...>*) {
   std::unique_ptr<Stepper> out;
   const auto look = [&](auto make_one, const char* kind) {
     if (kind == name) out = make_one(scene);
@@ -25,8 +24,6 @@ std::unique_ptr<Stepper> find(std::string_view name, SceneData& scene, std::stri
   (look(make<Methods>, Methods::kind), ...);
   return out;
 }
-
-}  // namespace
 
 std::unique_ptr<Stepper> make_stepper(std::string_view integrator, SceneData& scene) {
   using All =

@@ -1,7 +1,6 @@
 #include "dynamics/run/continuous_detection.hpp"
 
 namespace sphshell {
-namespace {
 
 constexpr double kApart = 1.0 / 16, kTouching = 0.25;  // shares of the radius
 // A touch on a shorter way than this share of the radius may be missed.
@@ -11,11 +10,9 @@ constexpr double kTurn = 0.5;
 constexpr double kMostTurned = 16;
 
 // A lower bound of the distance from a center to what is on body j [m].
-double distance_of(const Pair& pair, const Vec3& center) {
+static double distance_of(const Pair& pair, const Vec3& center) {
   return pair.ask([&](const auto& one) { return one.distance(center); });
 }
-
-}  // namespace
 
 // One known distance for each pair and each cluster.
 ContinuousDetection::ContinuousDetection(const SceneData& scene)

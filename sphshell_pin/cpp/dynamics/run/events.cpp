@@ -3,26 +3,23 @@
 #include <boost/math/tools/toms748_solve.hpp>
 
 namespace sphshell {
-namespace {
 
 // How far outside the sphere contacts are looked for, as a share of the radius.
 constexpr double kMargin = 0.25;
 constexpr std::uintmax_t kMostLooks = 200;
 
-long count_positive(const std::vector<double>& values) {
+static long count_positive(const std::vector<double>& values) {
   return std::count_if(values.begin(), values.end(), [](double value) { return value > 0; });
 }
 
 // Of a law that clamps its force at zero, less than zero where it acts. Laws are linear in the
 // rate: the force against the opposite rate is 2 elastic - unclamped.
-double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double force,
-                   double scale = 0) {
+static double clamp_gauge(const NormalLaw& law, double depth, double gap_rate, double force,
+                          double scale = 0) {
   if (force > 0) return -force;
   const NormalForce<double> opposed = law.force(depth, -gap_rate, scale);
   return opposed.total - 2 * opposed.elastic;
 }
-
-}  // namespace
 
 Events::Start Events::now(std::size_t k) const {
   const TouchState& at = scene_.touch(k);

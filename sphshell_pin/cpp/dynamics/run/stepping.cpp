@@ -1,7 +1,6 @@
 #include "dynamics/run/stepping.hpp"
 
 namespace sphshell {
-namespace {
 
 // Of the steps that replace a fixed one; of those behind kinks of contacts on planes.
 constexpr double kFineTolerance = 1e-7, kKinkTolerance = 2e-8;
@@ -26,9 +25,7 @@ constexpr double kErrorAtKink = 0.05, kOrderAtKink = 2.5, kFirstShare = 0.15;
 constexpr int kMostKinkRejections = 3;  // in one step; then the error is taken as it is
 
 // Of the numbers near t.
-double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
-
-}  // namespace
+static double spacing(double t) { return std::numeric_limits<double>::epsilon() * std::abs(t); }
 
 Stepping::Stepping(SceneData& scene, Torques& torques, const StepSettings& settings, State start)
     : settings_(settings),

@@ -1,11 +1,10 @@
 #include "dynamics/scene/bristles.hpp"
 
 namespace sphshell {
-namespace {
 
 // Index of the one whose point is nearest, of those that `fits`, or -1.
 template <class Item, class Fits>
-int nearest(const Vec3& point, const Item* items, std::size_t count, Fits fits) {
+static int nearest(const Vec3& point, const Item* items, std::size_t count, Fits fits) {
   int best = -1;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < count; ++i) {
@@ -17,13 +16,11 @@ int nearest(const Vec3& point, const Item* items, std::size_t count, Fits fits) 
 }
 
 // Brings x back into the plane of the normal at its full length.
-Vec3 flattened(const Vec3& x, const Vec3& normal) {
+static Vec3 flattened(const Vec3& x, const Vec3& normal) {
   const Vec3 flat = x - x.dot(normal) * normal;
   const double length = flat.norm();
   return length > 0 ? Vec3(flat * (x.norm() / length)) : flat;
 }
-
-}  // namespace
 
 // One pool of spare slots for each group.
 Bristles::Bristles(std::vector<int> groups)

@@ -1,23 +1,20 @@
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
-namespace {
 
 // The friction that acts at each place: none where there is a bristle, which is the contact's.
-FrictionLaw friction_of_places(const Pair& pair) {
+static FrictionLaw friction_of_places(const Pair& pair) {
   return pair.friction.has_state() ? FrictionLaw() : pair.friction;
 }
 
 // The spread that a bristle's arm follows, whose root that is, and its derivative by the spread:
 // less where that is small, as the root of a spread that begins grows without bound.
-std::pair<double, double> spread_of_arm(const Pair& pair, double spread) {
+static std::pair<double, double> spread_of_arm(const Pair& pair, double spread) {
   constexpr double kSmall = 0.05;  // of the size
   const double size = kSmall * std::get<PlaneBelow>(pair.geometry).flats().size;
   const double share = spread / (spread + size * size);
   return {share * spread, share * (2 - share)};
 }
-
-}  // namespace
 
 void PointForces::find_shared(const PlaneBelow& plane, const SE3& plane_from_shell, Query& query) {
   const Flats& flats = plane.flats();

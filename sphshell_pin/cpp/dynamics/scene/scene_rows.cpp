@@ -3,7 +3,6 @@
 #include "dynamics/scene/scene_data.hpp"
 
 namespace sphshell {
-namespace {
 
 // The numbers of a memory: of each pair how many contacts it has had, how many places are known,
 // how many there are with those of the step under way, and the center of its sphere (3) [m]; then,
@@ -13,12 +12,10 @@ namespace {
 constexpr std::size_t kOfPair = 6, kOfPlace = 9;
 
 // A whole number of those that a memory counts with.
-std::optional<int> count_at(const double* from) {
+static std::optional<int> count_at(const double* from) {
   if (!(*from >= 0 && *from < 1e9 && *from == std::floor(*from))) return {};
   return static_cast<int>(*from);
 }
-
-}  // namespace
 
 std::vector<double> SceneData::save(const VectorX& z) {
   std::vector<double> out;

@@ -6,9 +6,8 @@
 #include "shell/half_edges.hpp"
 
 namespace sphshell {
-namespace {
 
-std::array<Vec3, 3> corners_of(const Points& points, const std::int32_t* vertices) {
+static std::array<Vec3, 3> corners_of(const Points& points, const std::int32_t* vertices) {
   std::array<Vec3, 3> out;
   for (int k = 0; k < 3; ++k) out[k] = place(points, vertices[k]);
   return out;
@@ -16,8 +15,6 @@ std::array<Vec3, 3> corners_of(const Points& points, const std::int32_t* vertice
 
 // A cell this many tolerances wide: few points share a cell, and few lie near a cell's border.
 constexpr double kCellInTolerances = 64.0;
-
-}  // namespace
 
 Weld weld(Points points, double tolerance) {
   Weld out;

@@ -190,9 +190,8 @@ class Continuation {
 void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight,
                              const CoplanarRegions* regions, const std::vector<Trust>& trust) {
   const Topology& topology = shell.topology();
-  const std::vector<Triangle>& triangles = shell.triangles();
   const std::vector<Vec3>& p = shell.vertices();
-  facets_.resize(triangles.size());
+  facets_.resize(shell.triangles().size());
   tangents_.flat_ = &shell.facets();
   tangents_.curved_ = &facets_;
   tangents_.spoke_.resize(topology.neighbors.size());
@@ -202,7 +201,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
   const auto goes_on = [&](const Edge& edge) {
     const int h = topology.incidence[edge.begin],
               g = topology.incidence[edge.begin + edge.count - 1];
-    const bool opposed = triangles[h / 3][h % 3] != triangles[g / 3][g % 3];
+    const bool opposed = shell.opposed(h, g);
     const int h1 = corner_after(h), g1 = corner_after(g);
     return edge.count == 2 && are_same(normals_[h], normals_[opposed ? g1 : g]) &&
            are_same(normals_[h1], normals_[opposed ? g : g1]);
@@ -214,9 +213,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     first.clear();
     last.clear();
     bool limited = false;
-    const auto forward = [&](int h) {
-      return triangles[triangle_of(h)][side_of(h)] == edge.first_vertex;
-    };
+    const auto forward = [&](int h) { return shell.vertex(h) == edge.first_vertex; };
     for (int i = 0; i < edge.count; ++i) {
       const int h = topology.incidence[edge.begin + i];
       const Vec3& here = normals_[h];
@@ -277,8 +274,7 @@ void CurvedShell::raise_centers(const Shell& shell) {
     for (int k = 0; k < 3; ++k) {
       const int c = corner_beyond(shell, 3 * t + k);
       if (c < 0) continue;
-      const Vec3& q = shell.vertices()[shell.triangles()[c / 3][c % 3]];
-      continuation.add(k, q, normals_[c], along, square);
+      continuation.add(k, shell.point(c), normals_[c], along, square);
     }
     // Neighbors whose normals contradict it must not pull an element away from its own sides.
     // The least-squares solution of all neighbors together, limited.
@@ -290,16 +286,12 @@ void CurvedShell::raise_centers(const Shell& shell) {
 // The corner (3 triangle + k) opposite half-edge h, where the surface goes on beyond it: not across
 // a crease, nor into a flat element, where the curvature ends. Else -1.
 int CurvedShell::corner_beyond(const Shell& shell, int h) const {
-  const Topology& topology = shell.topology();
-  const int g = topology.other_half_edge(h);
-  if (g < 0) return -1;
-  const auto vertex = [&](int c) { return shell.triangles()[triangle_of(c)][side_of(c)]; };
-  if (vertex(h) != vertex(corner_after(g))) return -1;  // ill-wound
-  if (facets_[triangle_of(shell.facet_half_edge(g))].flat) return -1;
-  if (!are_same(normals_[h], normals_[corner_after(g)]) ||
-      !are_same(normals_[corner_after(h)], normals_[g]))
-    return -1;
-  return corner_before(g);
+  const int g = shell.topology().other_half_edge(h);
+  const bool goes_on = g >= 0 && shell.opposed(h, g) &&
+                       !facets_[triangle_of(shell.facet_half_edge(g))].flat &&
+                       are_same(normals_[h], normals_[corner_after(g)]) &&
+                       are_same(normals_[corner_after(h)], normals_[g]);
+  return goes_on ? corner_before(g) : -1;
 }
 
 }  // namespace sphshell

@@ -2,14 +2,13 @@
 #include "shell/in_parallel.hpp"
 
 namespace sphshell {
-namespace {
 
 constexpr double kAny = std::numeric_limits<double>::infinity();
 
 // The ten control points of a patch, [i][j] with i steps from corner 0 to 1 and j to corner 2.
 using Net = std::array<std::array<Vec3, 4>, 4>;
 
-Net control_points(const Facet& f, const CurvedFacet& curved) {
+static Net control_points(const Facet& f, const CurvedFacet& curved) {
   Net net;
   for (int i = 0; i < 4; ++i)
     for (int j = 0; i + j < 4; ++j)
@@ -25,7 +24,7 @@ Net control_points(const Facet& f, const CurvedFacet& curved) {
 
 // Bound on the tangent of the angle between `axis` and any normal of the patch: its normal field
 // lies in the hull of products of the tangents' control vectors.
-double tan_opening_of(const Net& net, const Vec3& axis) {
+static double tan_opening_of(const Net& net, const Vec3& axis) {
   std::array<Vec3, 6> a, b;  // the last coordinate along the axis
   const Vec3 east = axis.unitOrthogonal(), north = axis.cross(east);
   const auto seen = [&](const Vec3& d) { return Vec3(east.dot(d), north.dot(d), axis.dot(d)); };
@@ -47,8 +46,6 @@ double tan_opening_of(const Net& net, const Vec3& axis) {
     }
   return std::sqrt(most / beside);
 }
-
-}  // namespace
 
 CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) {
   const FacetAxes axes(facet);
@@ -93,8 +90,7 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
   axes.first(x, y);
   // The gradient of the height over the plane, in the middle.
   const Vec3 lean = n.dot(x) * axes.x + n.dot(y) * axes.y;
-  const Vec3 flat = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
-  const Vec3 offset = patch.point(kThird, kThird) - flat;
+  const Vec3 offset = patch.point(kThird, kThird) - facet.middle();
   // Rounded outward.
   // To single precision, so that what is certain in double precision stays certain.
   const auto up = [](double value) { return static_cast<float>(value + 1e-6 * std::abs(value)); };
@@ -172,7 +168,7 @@ void CurvedShell::build_cones(const Shell& shell) {
     for (int i = 0; face != nullptr && i < 7; ++i) {
       const Vec3* corner = facet.corner;
       const Vec3 chord = i < 3   ? Vec3((corner[i] + corner[next_corner(i)]) / 2)
-                         : i < 4 ? Vec3((corner[0] + corner[1] + corner[2]) / 3)
+                         : i < 4 ? facet.middle()
                                  : corner[i - 4];
       const Vec3 x = i < 4 ? middles[i] : chord;
       Vec3 n;
@@ -185,7 +181,7 @@ void CurvedShell::build_cones(const Shell& shell) {
     for (int k = 0; k < 3 && closed; ++k)
       sagitta = std::max<double>(sagitta, face_cells_[f].bulge[k]);
     NormalCone& cone = cones_[f];
-    const Vec3 middle = (facet.corner[0] + facet.corner[1] + facet.corner[2]) / 3;
+    const Vec3 middle = facet.middle();
     double reach = cone.reach;
     for (int i = 0; i < 4; ++i)
       for (int j = 0; i + j < 4; ++j)

@@ -4,7 +4,6 @@
 #include "shell/in_parallel.hpp"
 
 namespace sphshell {
-namespace {
 
 // A joint of a curved surface turns by what the elements on its two sides, each by itself, have
 // turned when they reach it, but for this share; and its two sides bend alike within this factor.
@@ -25,14 +24,12 @@ constexpr double kAveraged = 0.1;
 
 // How far a fan's normal is from the nearest mean of those of its elements, and how much it leans
 // from them.
-std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, const Vec3& normal) {
-  const auto point = [&](int corner) -> const Vec3& {
-    return shell.vertices()[fans.vertex(corner)];
-  };
+static std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f,
+                                      const Vec3& normal) {
   Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
   double lean = 0, off = std::numeric_limits<double>::infinity();
   for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-    const Vec3 a = point(corner_after(*c)) - point(*c), b = point(corner_before(*c)) - point(*c);
+    const Vec3 a = shell.along(*c), b = shell.point(corner_before(*c)) - shell.point(*c);
     const Vec3& n = shell.topology().face_normal[*c / 3];
     const double area = a.cross(b).norm();
     alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
@@ -42,8 +39,6 @@ std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f, cons
     off = std::min(off, (mean.normalized() - normal).norm());
   return {off, lean};
 }
-
-}  // namespace
 
 // Per corner whether its normal tells more than those of its elements do.
 std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
@@ -73,7 +68,7 @@ bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& no
 // there leans alike at both ends: exact where it is quadratic.
 SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
   const int i = h, j = corner_after(h), o = opposite(h);
-  const Vec3 &p = points()[vertex(i)], &q = points()[vertex(j)], &r = points()[vertex(o)];
+  const Vec3 &p = point(i), &q = point(j), &r = point(o);
   const Vec3 a = p - r, b = q - r;
   Vec3 along = q - p;
   const double length = along.norm();
@@ -105,13 +100,11 @@ SideEstimate CreaseSearch::estimate_side(const Fans& fans, int h) const {
 // anything of the surface there.
 bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
   const int o = opposite(h), fan = fans.of(o);
-  const Vec3& r = points()[vertex(o)];
-  const Vec3 along = points()[vertex(corner_after(h))] - points()[vertex(h)];
-  const Vec3 outward = along.cross(shell_.topology().face_normal[h / 3]);
+  const Vec3 outward = shell_.along(h).cross(shell_.topology().face_normal[h / 3]);
   const double least = kBeyond * kBeyond * outward.squaredNorm();
   for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
     for (int k : {corner_after(*c), corner_before(*c)}) {
-      const Vec3 d = points()[vertex(k)] - r;
+      const Vec3 d = point(k) - point(o);
       const double away = -d.dot(outward);
       if (away > 0 && away * away >= least * d.squaredNorm()) return true;
     }
@@ -198,9 +191,9 @@ void CreaseSearch::weigh_runs() {
           const float cosine = joints_[e].direction.dot(joints_[other].direction);
           if (cosine * cosine < 0.5) return;
           // The side of the other joint that leads on, away from this one.
-          const int beyond = vertex(opposite(joints_[other].half_edge[1]));
-          const int back = vertex(opposite(joints_[other].half_edge[0]));
-          const bool second = (points()[beyond] - points()[back]).dot(middle(other) - here) > 0;
+          const auto [back, beyond] = joints_[other].half_edge;
+          const Vec3 on = point(opposite(beyond)) - point(opposite(back));
+          const bool second = on.dot(middle(other) - here) > 0;
           most = std::max(most, evidence_[other] + run_[other][second ? 1 : 0]);
         });
       }

@@ -45,7 +45,8 @@ class CreaseSearch {
 
  private:
   const std::vector<Vec3>& points() const { return shell_.vertices(); }
-  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
+  int vertex(int corner) const { return shell_.vertex(corner); }
+  const Vec3& point(int corner) const { return shell_.point(corner); }
   bool is_known(int corner) const { return faces_.of_triangle(corner / 3) >= 0; }
   // Whether the faces at both sides of a joint are known.
   bool is_settled(std::size_t e) const {

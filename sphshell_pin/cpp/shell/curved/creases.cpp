@@ -25,11 +25,10 @@ void CreaseSearch::list_joints() {
     Joint& joint = joints_[e];
     joint.direction =
         (points()[edge.last_vertex] - points()[edge.first_vertex]).normalized().cast<float>();
-    joint.angle = static_cast<float>(topology.angle(points(), shell_.triangles(), edge));
+    joint.angle = static_cast<float>(shell_.angle(edge));
     joint.half_edge[0] = joint.half_edge[1] = -1;
     if (edge.count != 2 || edge.on_rim()) continue;
-    joint.half_edge[0] = topology.incidence[edge.begin];
-    joint.half_edge[1] = topology.incidence[edge.begin + 1];
+    std::tie(joint.half_edge[0], joint.half_edge[1]) = topology.half_edges(edge);
   }
 }
 
@@ -241,7 +240,7 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
       before = std::max(before, (original_[*c] - own).norm());
       for (int w : {corner_after(*c), corner_before(*c)}) {
         if (divided_[w]) continue;
-        const Vec3 d = (points()[vertex(w)] - points()[vertex(*c)]).normalized();
+        const Vec3 d = (point(w) - point(*c)).normalized();
         square += d * d.transpose();
         along -= d * normals()[w].dot(d);
       }

@@ -5,7 +5,6 @@
 #include "shell/curved/vertex_normals.hpp"
 
 namespace sphshell {
-namespace {
 
 // Coordinates are known to this share of the box at best: single precision, with a margin.
 constexpr double kSinglePrecision = 2e-7;
@@ -17,11 +16,9 @@ constexpr double kMostMoved = 3;
 // Systems write CAD files whose edges are off the faces by this share of the size.
 constexpr double kFileTolerance = 1e-4;
 
-double tolerance_of(const Shell& shell, const CurveOptions& options) {
+static double tolerance_of(const Shell& shell, const CurveOptions& options) {
   return std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
 }
-
-}  // namespace
 
 // A corner compares its normal with the last one of its vertex: corners of a fan mostly come one
 // after another.
@@ -30,7 +27,7 @@ SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normal
   distinct_.reserve(shell.vertices().size());
   LargeArray<int> latest(shell.vertices().size(), -1);
   for (std::size_t c = 0; c < normals.size(); ++c) {
-    int& last = latest[shell.triangles()[c / 3][c % 3]];
+    int& last = latest[shell.vertex(static_cast<int>(c))];
     if (last < 0 || distinct_[last] != normals[c]) {
       last = static_cast<int>(distinct_.size());
       distinct_.push_back(normals[c]);
@@ -132,7 +129,7 @@ std::vector<double> CurvedShell::chord_errors(const Shell& shell) const {
   };
   const CoplanarRegions regions(shell, kSinglePrecision * shell.size());
   const SagittaWitness witness(shell, regions, [&](const Edge& edge) {
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    const auto [h, g] = topology.half_edges(edge);
     return (normal_at(h) - normal_at(corner_after(g))).norm() <= 10 * kSameNormal &&
            (normal_at(corner_after(h)) - normal_at(g)).norm() <= 10 * kSameNormal;
   });

@@ -106,7 +106,7 @@ CubicPatch CurvedFacet::patch(const Facet& f) const {
 // The four control points of the side, as powers of t.
 CubicCurve CurvedFacet::side(const Facet& f, int k) const {
   const Vec3 a = control_offset(k, 0), b = control_offset(k, 1);
-  return {f.corner[k], f.corner[next_corner(k)] - f.corner[k] + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
+  return {f.corner[k], f.side(k) + 3 * a, 3 * b - 6 * a, 3 * (a - b)};
 }
 
 // The derivative of the side at its end, pointing away from the vertex: three times the first
@@ -115,7 +115,7 @@ Vec3 Tangents::operator[](int i) const {
   const int h = spoke_[i] / 2, f = triangle_of(h), k = side_of(h);
   const Facet& facet = (*flat_)[f];
   const CurvedFacet& curved = (*curved_)[f];
-  const Vec3 d = facet.corner[next_corner(k)] - facet.corner[k];
+  const Vec3 d = facet.side(k);
   if (spoke_[i] % 2 == 0) return d + 3 * curved.control_offset(k, 0);
   return 3 * curved.control_offset(k, 1) - d;
 }

@@ -12,18 +12,15 @@ class Fans {
   // is_smooth(edge): whether the two triangles of an edge join the fans at its ends.
   template <class IsSmooth>
   Fans(const Shell& shell, IsSmooth&& is_smooth) : shell_(shell) {
-    const std::vector<Triangle>& triangles = shell.triangles();
-    const Topology& topology = shell.topology();
-    const int corners = 3 * static_cast<int>(triangles.size());
+    const int corners = 3 * static_cast<int>(shell.triangles().size());
     // Corners of two triangles at both ends of a smooth edge are one; opposed: wound alike.
     DisjointSets sets(corners);
-    for (const Edge& edge : topology.edges) {
+    for (const Edge& edge : shell.topology().edges) {
       if (edge.count != 2 || !is_smooth(edge)) continue;
-      const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
-      const int h1 = corner_after(h), g1 = corner_after(g);
-      const bool opposed = vertex(h) == vertex(g1);
-      sets.merge(h, opposed ? g1 : g);
-      sets.merge(h1, opposed ? g : g1);
+      const auto [h, g] = shell.topology().half_edges(edge);
+      const bool opposed = shell.opposed(h, g);
+      sets.merge(h, opposed ? corner_after(g) : g);
+      sets.merge(corner_after(h), opposed ? g : corner_after(g));
     }
     // Counting sort of the corners by fan; begin_[fan + 1] runs from its beginning to its end.
     fan_of_ = sets.labels();
@@ -40,12 +37,11 @@ class Fans {
   int count(int fan) const { return begin_[fan + 1] - begin_[fan]; }
   const int* begin(int fan) const { return members_.data() + begin_[fan]; }
   const int* end(int fan) const { return members_.data() + begin_[fan + 1]; }
-  int vertex(int corner) const { return shell_.triangles()[corner / 3][corner % 3]; }
 
   // The vertices two edges or less from the fan's own, through triangles that smooth edges join
   // and not past a sharp vertex.
   void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
-    const int own = vertex(*begin(fan));
+    const int own = shell_.vertex(*begin(fan));
     const auto sort = [&out](std::size_t from) {
       std::sort(out.begin() + from, out.end());
       out.erase(std::unique(out.begin() + from, out.end()), out.end());
@@ -61,7 +57,7 @@ class Fans {
       if (sharp[out[i]]) continue;
       for (const int *d = begin(out[i]), *last = end(out[i]); d != last; ++d)
         for (const int other : {corner_after(*d), corner_before(*d)}) {
-          const int v = vertex(other);
+          const int v = shell_.vertex(other);
           if (v != own && (out.size() > fans + kFew ||
                            std::find(out.begin() + fans, out.end(), v) == out.end()))
             out.push_back(v);

@@ -18,8 +18,8 @@ Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
   for (std::size_t e = 0; e < uneven_.size(); ++e) {
     const Edge& edge = topology.edges[e];
     if (edge.count != 2 || edge.kind != EdgeClass::Smooth) continue;
-    const double a = regions.height(topology.incidence[edge.begin]),
-                 b = regions.height(topology.incidence[edge.begin + 1]);
+    const auto [h, g] = topology.half_edges(edge);
+    const double a = regions.height(h), b = regions.height(g);
     // Heights over the common side, of coplanar regions as a whole.
     uneven_[e] = a > kMuchHigher * b || b > kMuchHigher * a;
   }
@@ -93,17 +93,15 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
 }
 
 void SagittaWitness::add(const Shell& shell, const Edge& edge) {
-  const Topology& topology = shell.topology();
-  const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+  const auto [h, g] = shell.topology().half_edges(edge);
   const int a = regions_.of(triangle_of(h)), b = regions_.of(triangle_of(g));
   if (a == b) return;
-  const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+  const double turn = std::abs(shell.angle(edge));
   // turn x height / 8: the sagitta of an arc of that turn over that length.
   const auto s = static_cast<float>(turn * std::min(regions_.height(h), regions_.height(g)) / 8);
   sagitta_[a] = std::max(sagitta_[a], s);
   sagitta_[b] = std::max(sagitta_[b], s);
-  const std::vector<Vec3>& p = shell.vertices();
-  sides_.push_back({s, static_cast<float>((p[edge.last_vertex] - p[edge.first_vertex]).norm())});
+  sides_.push_back({s, static_cast<float>(shell.along(h).norm())});
 }
 
 // The weighted quantile by the lengths of the sides: the last one before which no more of them
@@ -136,8 +134,7 @@ double SagittaWitness::most(const Shell& shell, const Edge& edge, bool smooth, b
     lowest = std::min(lowest, regions_.height(shell.topology().incidence[i]));
   }
   const double local = kMostSagittas * (smooth ? least : most);
-  const double length =
-      (shell.vertices()[edge.last_vertex] - shell.vertices()[edge.first_vertex]).norm();
+  const double length = shell.along(shell.topology().incidence[edge.begin]).norm();
   return fitted && length <= kNeedle * lowest ? local : std::min(local, kMostUsual * usual_);
 }
 

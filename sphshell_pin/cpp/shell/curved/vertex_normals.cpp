@@ -37,11 +37,9 @@ template <class NormalAt>
 bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, const int* begin, const int* end) {
   double uneven = 0, bent = 0;
   for (const int* c = begin; c != end; ++c) {
-    const int t = *c / 3, k = *c % 3;
-    const Triangle& triangle = shell.triangles()[t];
-    for (int far : {next_corner(k), previous_corner(k)}) {
-      const Vec3 edge = shell.vertices()[triangle[far]] - shell.vertices()[triangle[k]];
-      const double here = -normal_at(*c).dot(edge), there = normal_at(3 * t + far).dot(edge);
+    for (const int far : {corner_after(*c), corner_before(*c)}) {
+      const Vec3 edge = shell.point(far) - shell.point(*c);
+      const double here = -normal_at(*c).dot(edge), there = normal_at(far).dot(edge);
       // On a circular arc a chord leaves both tangent planes by the same angle; on a cone's ruling
       // that of the far end is zero.
       uneven += std::abs(here - there) / edge.norm();
@@ -160,10 +158,7 @@ bool fit_normal(const Vec3& origin, const std::vector<Vec3>& points, Vec3& norma
 
 // |a x b| / (|a|^2 |b|^2).
 double max_weight(const Shell& shell, int corner) {
-  const Triangle& t = shell.triangles()[corner / 3];
-  const int k = corner % 3;
-  const std::vector<Vec3>& p = shell.vertices();
-  const Vec3 a = p[t[next_corner(k)]] - p[t[k]], b = p[t[previous_corner(k)]] - p[t[k]];
+  const Vec3 a = shell.along(corner), b = shell.point(corner_before(corner)) - shell.point(corner);
   return a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
 }
 
@@ -184,11 +179,11 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   std::vector<Trust> trust(out.size(), Trust::Averaged);
   const auto known = [&](int c) { return faces.of_triangle(c / 3) >= 0; };
   for (int c = 0; c < corners; ++c)
-    if (known(c)) out[c] = faces.normal(shell, c / 3, c % 3), trust[c] = Trust::Own;
+    if (known(c)) out[c] = faces.normal(shell, c), trust[c] = Trust::Own;
   // Faces with normals of their own meet at a crease, whatever the angle.
   const Fans fans(shell, [&](const Edge& edge) {
     if (!edge.inner && edge.kind != EdgeClass::Smooth) return false;
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    const auto [h, g] = topology.half_edges(edge);
     return !known(h) || !known(g) ||
            (out[h] - out[corner_after(g)]).norm() + (out[corner_after(h)] - out[g]).norm() <
                kSameNormal;
@@ -218,7 +213,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     fans.vertices_around(fan, sharp, vertices);
     at.clear();
     for (int v : vertices) at.push_back(shell.vertices()[v]);
-    return shell.vertices()[fans.vertex(*fans.begin(fan))];
+    return shell.point(*fans.begin(fan));
   };
   // Whether both fits leave next to nothing and agree: an uneven sampling of a smooth surface.
   const auto fits_surely = [&](int fan) {
@@ -291,7 +286,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     };
     // Two fits that agree are right. One alone has to stay close to the triangles; seen from one
     // side only, a normal may lie somewhat beyond them.
-    const bool open = topology.vertex_sharp[fans.vertex(*fans.begin(fan))];
+    const bool open = topology.vertex_sharp[shell.vertex(*fans.begin(fan))];
     if (fits && fits_better ? agree(quadratic, cubic, kLikely * wide)
                             : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
       fitted[fan] = cubic;
@@ -317,13 +312,13 @@ bool estimated_elsewhere(const Shell& shell, const std::vector<Vec3>& given) {
   const Topology& topology = shell.topology();
   const auto alike = [&](int i, int j) { return (given[i] - given[j]).norm() <= kSameNormal; };
   const Fans fans(shell, [&](const Edge& edge) {
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    const auto [h, g] = topology.half_edges(edge);
     return alike(h, corner_after(g)) && alike(corner_after(h), g);
   });
   // Means over edges beyond the crease angle, as on a coarse ball, are better than none.
   int within = 0, beyond = 0;
   for (const Edge& edge : topology.edges) {
-    const double turn = std::abs(topology.angle(shell.vertices(), shell.triangles(), edge));
+    const double turn = std::abs(shell.angle(edge));
     within += turn > kSameNormal && edge.kind == EdgeClass::Smooth;
     beyond += turn < kSurelySharp && edge.kind == EdgeClass::Crease;
   }
@@ -336,14 +331,14 @@ EstimatedNormals settle_given_normals(const Shell& shell, const std::vector<Vec3
   const int corners = static_cast<int>(given.size());
   for (int c = 0; c < corners; ++c) {
     const int face = faces.of_triangle(c / 3);
-    if (face >= 0 && (faces.normal(shell, c / 3, c % 3) - given[c]).norm() > kContradiction)
+    if (face >= 0 && (faces.normal(shell, c) - given[c]).norm() > kContradiction)
       // One corner is enough: the face is given up as a whole.
       contradicted[face] = 1;
   }
   faces.give_up(contradicted);
   EstimatedNormals out{given, std::vector<Trust>(given.size(), Trust::Own), true};
   for (int c = 0; c < corners; ++c)
-    if (faces.of_triangle(c / 3) >= 0) out.normals[c] = faces.normal(shell, c / 3, c % 3);
+    if (faces.of_triangle(c / 3) >= 0) out.normals[c] = faces.normal(shell, c);
   return out;
 }
 

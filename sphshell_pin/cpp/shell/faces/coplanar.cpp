@@ -74,8 +74,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     // In the order of memory, which that of the areas is not.
     alone_[t] = 1;
     for (int k = 0; k < 3 && alone_[t]; ++k) {
-      const int h = topology.other_half_edge(static_cast<int>(3 * t) + k);
-      alone_[t] = h < 0 || !(off_plane(triangle_of(h), topology.face_normal[t], p[c[0]]) <= near);
+      const int u = topology.neighbor(static_cast<int>(3 * t) + k);
+      alone_[t] = u < 0 || !(off_plane(u, topology.face_normal[t], p[c[0]]) <= near);
     }
   });
   // The largest triangle of a region gives its plane, as its normal is the most exact.
@@ -108,9 +108,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
         out.area += area[t];
         for (int k = 0; k < 3; ++k) {
           box.extend(p[triangles[t][k]]);
-          const int h = topology.other_half_edge(3 * t + k);
-          if (h < 0 || of_[triangle_of(h)] >= 0) continue;
-          const int u = triangle_of(h);
+          const int u = topology.neighbor(3 * t + k);
+          if (u < 0 || of_[u] >= 0) continue;
           const double off = off_plane(u, plane.first, plane.second);
           if (off > tolerance) {
             if (off < nearest) nearest = off, next = u;

@@ -64,8 +64,8 @@ std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
   std::vector<int> border;
   for (const int t : growth.triangles)
     for (int k = 0; k < 3; ++k) {
-      const int g = topology.other_half_edge(3 * t + k);
-      if (g >= 0 && is_marked(triangle_of(g))) continue;
+      const int u = topology.neighbor(3 * t + k);
+      if (u >= 0 && is_marked(u)) continue;
       const Edge& edge = topology.edge_at(3 * t + k);
       border.push_back(edge.first_vertex);
       border.push_back(edge.last_vertex);
@@ -88,17 +88,11 @@ bool Recognizer::is_weak(const Growth& growth) {
 bool Recognizer::drifts_away(const Growth& growth) {
   mark(growth.triangles);
   std::size_t leaving = 0, slowly = 0;
-  for (const int t : growth.triangles)
-    for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || is_marked(u)) continue;
-      double most = 0;
-      for (const int v : corners(u))
-        most = std::max(most, std::abs(growth.shape.distance(point(v))));
-      if (most <= growth.window) continue;
-      ++leaving;
-      slowly += most < kDrift * growth.window;
-    }
+  for_each_beside(growth.triangles, [&](int u) {
+    const double most = off(u, growth.shape);
+    leaving += most > growth.window;
+    slowly += most > growth.window && most < kDrift * growth.window;
+  });
   return double(slowly) > kMostDrifting * double(leaving);
 }
 

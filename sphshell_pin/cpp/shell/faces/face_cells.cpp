@@ -7,7 +7,6 @@
 #include "shell/curved/curved.hpp"
 
 namespace sphshell {
-namespace {
 
 constexpr double kTurn = 6.283185307179586;
 // Facets of one face overlap by this share of their parameters: one of them has each point.
@@ -18,12 +17,13 @@ constexpr double kOffPlane = 1e-13;
 constexpr double kEqual = 1e-12;
 
 // The difference of two parameters, of angles by the shorter way.
-double difference(double from, double to, bool angle) {
+static double difference(double from, double to, bool angle) {
   return angle ? to - from - kTurn * std::round((to - from) / kTurn) : to - from;
 }
 
 // Per round shape the first that is the same surface, to `most` [m] within about the size.
-std::vector<int> first_of_equals(const std::vector<Primitive>& shapes, double size, double most) {
+static std::vector<int> first_of_equals(const std::vector<Primitive>& shapes, double size,
+                                        double most) {
   // Places on the second are on the first: that holds whatever their numbers refer to.
   const auto equal = [&](const Primitive& a, const Primitive& b) {
     if (a.kind != b.kind || !(std::abs(a.second - b.second) * size <= most)) return false;
@@ -48,8 +48,6 @@ std::vector<int> first_of_equals(const std::vector<Primitive>& shapes, double si
   }
   return out;
 }
-
-}  // namespace
 
 std::array<Vec3, 4> middles_of(const Primitive& shape, const FaceCell& cell, const Facet& facet,
                                double size) {
@@ -125,9 +123,7 @@ class CellMaker {
   // The half-edge of the facet beyond a side, if the surface goes on there; else -1.
   int beyond(int f, int k) const {
     const int h = 3 * shell_.triangle_of_facet(f) + k, g = shell_.topology().other_half_edge(h);
-    if (g < 0) return -1;
-    const auto vertex = [&](int i) { return shell_.triangles()[triangle_of(i)][side_of(i)]; };
-    return vertex(h) != vertex(g) ? shell_.facet_half_edge(g) : -1;
+    return g >= 0 && shell_.opposed(h, g) ? shell_.facet_half_edge(g) : -1;
   }
 
   // Leaves a facet to its cubic: its border to another face (its own: a vertex) is off its face.

@@ -53,9 +53,9 @@ class Search {
 
  private:
   const Vec3& place(int vertex) const { return shell_.vertices()[vertex]; }
-  int start(int h) const { return shell_.triangles()[triangle_of(h)][side_of(h)]; }
+  int start(int h) const { return shell_.vertex(h); }
   int end(int h) const { return start(corner_after(h)); }
-  Vec3 along(int h) const { return place(end(h)) - place(start(h)); }
+  Vec3 along(int h) const { return shell_.along(h); }
 
   bool is_plane(int triangle) const {
     const int f = triangle_of(shell_.facet_half_edge(3 * triangle));

@@ -3,7 +3,6 @@
 #include "shell/faces/recognizer.hpp"
 
 namespace sphshell {
-namespace {
 
 // The normal of a facet that leans more than this [rad] from the primitive's at its corners says
 // nothing.
@@ -22,7 +21,7 @@ constexpr std::size_t kVerticesOfPlane = 5;
 
 // The normals of a shape at the corners of a facet. At the tip of a cone, where it has none, each
 // facet takes that of its own middle.
-std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>& corners) {
+static std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>& corners) {
   std::array<Vec3, 3> out;
   for (int k = 0; k < 3; ++k) shape.distance(corners[k], out[k]);
   if (shape.kind != FaceKind::Cone) return out;
@@ -32,8 +31,6 @@ std::array<Vec3, 3> normals_at(const Primitive& shape, const std::array<Vec3, 3>
     if (off_axis(corners[k]) < kTip * off_axis(centroid)) shape.distance(centroid, out[k]);
   return out;
 }
-
-}  // namespace
 
 int turned_on(const Primitive& shape, const std::array<Vec3, 3>& x, double tolerance) {
   double doubled, longest2 = 0;
@@ -66,12 +63,11 @@ int turned_on(const Primitive& shape, const std::array<Vec3, 3>& x, double toler
   return doubled < 0 ? -1 : 1;
 }
 
-Vec3 Faces::normal(const Shell& shell, int t, int k) const {
-  const Triangle& c = shell.triangles()[t];
-  const std::vector<Vec3>& p = shell.vertices();
-  const std::array<Vec3, 3> corners = {p[c[0]], p[c[1]], p[c[2]]};
+Vec3 Faces::normal(const Shell& shell, int corner) const {
+  const int t = triangle_of(corner);
+  const std::array<Vec3, 3> corners = shell.corners(t);
   const Primitive& shape = shapes[of[t]];
-  const Vec3 n = normals_at(shape, corners)[k];
+  const Vec3 n = normals_at(shape, corners)[side_of(corner)];
   // On the side of the facet's own normal, if that says anything.
   const double along = n.dot(shell.topology().face_normal[t]);
   const int turned = std::abs(along) > std::cos(kMostLeanOnFace) ? 0 : turned_on(shape, corners, 0);
@@ -81,8 +77,7 @@ Vec3 Faces::normal(const Shell& shell, int t, int k) const {
 // The largest angle [rad] between a facet and the shape's normals at its corners.
 double Recognizer::lean(int t, const Primitive& shape) const {
   double least = 1;
-  const Triangle& c = corners(t);
-  for (const Vec3& n : normals_at(shape, {point(c[0]), point(c[1]), point(c[2])}))
+  for (const Vec3& n : normals_at(shape, shell_.corners(t)))
     least = std::min(least, std::abs(n.dot(facet_normal(t))));
   return std::acos(std::min(least, 1.0));
 }
@@ -92,10 +87,9 @@ double Recognizer::lean(int t, const Primitive& shape) const {
 // a primitive that passes and is wrong can do bounded harm only.
 Recognizer::Explained Recognizer::explain(int t, const Primitive& shape, double tolerance) const {
   Explained out{false, false, 0, 0};
-  const Triangle& c = corners(t);
-  for (int v : c)
-    if (!(std::abs(shape.distance(point(v))) <= tolerance)) return out;
-  const std::array<Vec3, 3> at = {point(c[0]), point(c[1]), point(c[2])};
+  const std::array<Vec3, 3> at = shell_.corners(t);
+  for (const Vec3& x : at)
+    if (!(std::abs(shape.distance(x)) <= tolerance)) return out;
   const std::array<Vec3, 3> normals = normals_at(shape, at);
   double flat[3], curved[3], beyond[3] = {0, 0, 0}, sum = 0;
   for (int k = 0; k < 3; ++k) {
@@ -154,11 +148,8 @@ Growth Recognizer::grow(int seed, const Primitive& shape, double tolerance) {
     for (int k = 0; k < 3; ++k) {
       int u = beside_[3 * t + k];
       if (u < 0) {
-        const int h = shell_.topology().other_half_edge(3 * t + k);
-        if (h < 0 || is_marked(triangle_of(h)) ||
-            !(one.leans || explain(triangle_of(h), shape, tolerance).leans))
-          continue;
-        u = triangle_of(h);
+        u = shell_.topology().neighbor(3 * t + k);
+        if (u < 0 || is_marked(u) || !(one.leans || explain(u, shape, tolerance).leans)) continue;
       }
       if (is_marked(u)) continue;
       mark_[u] = round_;
@@ -288,9 +279,9 @@ void Recognizer::absorb(int face) {
     const int t = open.back();
     open.pop_back();
     for (int k = 0; k < 3; ++k) {
-      const int h = shell_.topology().other_half_edge(3 * t + k);
-      if (h < 0) continue;
-      const int u = triangle_of(h), other = of_[u], region = regions_.of(u);
+      const int u = shell_.topology().neighbor(3 * t + k);
+      if (u < 0) continue;
+      const int other = of_[u], region = regions_.of(u);
       gained.clear();
       if (other < 0) {
         if (inscribed_[region] == Inscribed::No && regions_.count(region) < kFewOfBand && fits(u))

@@ -4,7 +4,6 @@
 #include "shell/faces/recognizer.hpp"
 
 namespace sphshell {
-namespace {
 
 // Vertices to guess from: enough for the kinds of up to six parameters, and for a torus.
 constexpr std::size_t kFewVertices = 8, kManyVertices = 12;
@@ -16,8 +15,6 @@ constexpr double kLeastRadius = 1e-3;
 constexpr double kAcross = 0.5;
 // What is beyond a ring is off it by more windows.
 constexpr double kAtOnce = 100;
-
-}  // namespace
 
 // Triangles around the seed until they have so many vertices: ring by ring, what turns most first,
 // or over the longest sides first, which lead along a strip.
@@ -44,7 +41,7 @@ std::vector<int> Recognizer::patch(int seed, std::size_t vertices, bool along, i
       if (u < 0 || is_marked(u) || (beside < 0 ? of_[u] >= 0 : of_[u] == beside) || !curved_[u])
         continue;
       mark_[u] = round_;
-      const double side = (point(corners(t)[next_corner(k)]) - point(corners(t)[k])).norm();
+      const double side = shell_.along(3 * t + k).norm();
       open.push({along ? side : -double(ring) + 0.1 * turn_[u], u});
     }
   }
@@ -105,7 +102,7 @@ void Recognizer::try_ring(int seed, Growth& best, double& score) {
     add(t, 0);
     for (int k = 0; k < 3; ++k) {
       const int u = beside_[3 * t + k];
-      const Vec3 side = point(corners(t)[next_corner(k)]) - point(corners(t)[k]);
+      const Vec3 side = shell_.along(3 * t + k);
       if (u < 0 || is_marked(u) || std::abs(side.dot(tube.axis)) > kAcross * side.norm()) continue;
       add(u, (centroid(u) - centroid(t)).dot(tube.axis) < 0 ? 1 : 2);
       all.push_back(u);
@@ -126,16 +123,12 @@ void Recognizer::try_ring(int seed, Growth& best, double& score) {
       !try_shape(seed, ring, found, worth) || !(worth > few))
     return;
   mark(found.triangles);
-  for (const int t : found.triangles)
-    for (int k = 0; k < 3; ++k) {
-      const int u = beside_[3 * t + k];
-      if (u < 0 || is_marked(u)) continue;
-      double most = 0;
-      for (const int v : corners(u))
-        most = std::max(most, std::abs(found.shape.distance(point(v))));
-      if (most > found.window && most < kAtOnce * found.window) return;
-    }
-  score = worth, best = std::move(found);
+  bool ends = true;
+  for_each_beside(found.triangles, [&](int u) {
+    const double most = off(u, found.shape);
+    ends = ends && !(most > found.window && most < kAtOnce * found.window);
+  });
+  if (ends) score = worth, best = std::move(found);
 }
 
 bool Recognizer::recognize_from(int seed) {
@@ -161,13 +154,9 @@ bool Recognizer::recognize_from(int seed) {
     if (!is_weak(best)) continue;
     // A strip may be a zone of something rounder: with the strips beside it.
     mark(region);
-    for (std::size_t i = 0; i < size; ++i)
-      for (int k = 0; k < 3; ++k) {
-        const int u = beside_[3 * region[i] + k];
-        if (u < 0 || is_marked(u) || !curved_[u]) continue;
-        mark_[u] = round_;
-        region.push_back(u);
-      }
+    for_each_beside(std::vector<int>(region), [&](int u) {
+      if (curved_[u]) mark_[u] = round_, region.push_back(u);
+    });
     try_kinds(seed, region, true, true, best, score);
     if (best.triangles.size() == size) try_ring(seed, best, score);
   }
@@ -186,9 +175,9 @@ void Recognizer::recognize_rims(int face) {
   std::vector<char> asked(faces_.size(), 0);
   for (const int t : all)
     for (int k = 0; k < 3 && of_[t] == face; ++k) {
-      const int h = shell_.topology().other_half_edge(3 * t + k);
-      const int seed = h < 0 ? face : triangle_of(h), other = h < 0 ? face : of_[seed];
-      if (other == face || !curved_[seed]) continue;
+      const int seed = shell_.topology().neighbor(3 * t + k);
+      if (seed < 0 || of_[seed] == face || !curved_[seed]) continue;
+      const int other = of_[seed];
       asked.resize(faces_.size(), 0);
       if (other >= 0) {
         if (asked[other] || !is_weak(faces_[other])) continue;

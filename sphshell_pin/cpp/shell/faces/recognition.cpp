@@ -5,7 +5,6 @@
 #include "shell/faces/recognizer.hpp"
 
 namespace sphshell {
-namespace {
 
 // Where nothing has been found from so many seeds, nothing is looked for any longer; and so many
 // triangles per seed more. Nor where more seeds than these have failed in all than triangles were
@@ -28,8 +27,6 @@ constexpr double kNoTurn = 1e-5;
 // A zone of a free shape is less than so many shortest sides of its triangles long; or an arc over
 // its triangles rises by less than so many deviations of its flat sides.
 constexpr double kShort = 6, kMostRise = 4;
-
-}  // namespace
 
 // The others keep their order.
 void Faces::give_up(const std::vector<char>& gone) {
@@ -58,21 +55,25 @@ Recognizer::Recognizer(const Shell& shell, const CoplanarRegions& regions, doubl
 }
 
 Vec3 Recognizer::centroid(int t) const {
-  const Triangle& c = corners(t);
-  return (point(c[0]) + point(c[1]) + point(c[2])) / 3;
+  const auto [a, b, c] = shell_.corners(t);
+  return (a + b + c) / 3;
 }
 
 double Recognizer::area(int t) const {
-  const Triangle& c = corners(t);
-  return (point(c[1]) - point(c[0])).cross(point(c[2]) - point(c[0])).norm() / 2;
+  const auto [a, b, c] = shell_.corners(t);
+  return (b - a).cross(c - a).norm() / 2;
 }
 
 double Recognizer::longest_side(int t) const {
-  const Triangle& c = corners(t);
   double longest = 0;
-  for (int k = 0; k < 3; ++k)
-    longest = std::max(longest, (point(c[next_corner(k)]) - point(c[k])).norm());
+  for (int k = 0; k < 3; ++k) longest = std::max(longest, shell_.along(3 * t + k).norm());
   return longest;
+}
+
+double Recognizer::off(int t, const Primitive& shape) const {
+  double most = 0;
+  for (const int v : corners(t)) most = std::max(most, std::abs(shape.distance(point(v))));
+  return most;
 }
 
 // The angle [rad] between the normals of two facets.
@@ -119,7 +120,7 @@ void Recognizer::find_candidates() {
   std::vector<double> around(straight.size(), 0);
   for (const Edge& edge : topology.edges) {
     if (edge.count != 2 || !(edge.inner || edge.kind == EdgeClass::Smooth)) continue;
-    const int h = topology.incidence[edge.begin], g = topology.incidence[edge.begin + 1];
+    const auto [h, g] = topology.half_edges(edge);
     const int t = triangle_of(h), u = triangle_of(g), r = regions_.of(t), s = regions_.of(u);
     const double angle = turn(t, u);
     if (angle > kMostTurn * shell_.crease_angle()) continue;
@@ -195,20 +196,19 @@ void Recognizer::drop_zones_of_free_shapes() {
     for (const int t : face.triangles) {
       double least = longest_side(t);
       for (int k = 0; k < 3; ++k) {
-        const Vec3& here = point(corners(t)[k]);
-        least = std::min(least, (point(corners(t)[next_corner(k)]) - here).norm());
-        const double along = (here - face.shape.point).dot(face.shape.axis);
+        const double side = shell_.along(3 * t + k).norm();
+        least = std::min(least, side);
+        const double along = (shell_.point(3 * t + k) - face.shape.point).dot(face.shape.axis);
         if (shortest.empty() && k == 0) low = high = along;
         low = std::min(low, along), high = std::max(high, along);
-        const int u = beside_[3 * t + k], h = shell_.topology().other_half_edge(3 * t + k);
-        border += h < 0 || of_[triangle_of(h)] != int(f);
+        const int u = beside_[3 * t + k], other = shell_.topology().neighbor(3 * t + k);
+        border += other < 0 || of_[other] != int(f);
         if (u < 0 || of_[u] == int(f)) continue;
         if (!(of_[u] >= 0 ? weak[of_[u]]
                           : curved_[u] && !is_own_plane(u) &&
                                 regions_.area(regions_.of(u)) < 2 * kFarLarger * mean))
           continue;
         ++vague;
-        const double side = (point(corners(t)[next_corner(k)]) - here).norm();
         rises.push_back(turn(t, u) * (2 * area(t) / side) / 8);
         wider.push_back(area(t) / area(u));  // on one base
       }
@@ -259,24 +259,18 @@ std::vector<Recognizer::Moments> Recognizer::moments_of_regions(const std::vecto
 // around a corner is no wider there than elsewhere.
 double Recognizer::reach_across(int h) const {
   const int region = regions_.of(triangle_of(h));
-  const auto vertex = [&](int half_edge) {
-    return corners(triangle_of(half_edge))[side_of(half_edge)];
-  };
-  const Vec3 &first = point(vertex(h)),
-             &last = point(vertex(3 * triangle_of(h) + next_corner(side_of(h))));
-  const Vec3 middle = (first + last) / 2, along = (last - first).normalized();
+  const Vec3 middle = (shell_.point(h) + shell_.point(corner_after(h))) / 2;
+  const Vec3 along = shell_.along(h).normalized();
   const Vec3 across = regions_.normal(region).cross(along);
   double reach = 0;
   for (int steps = 0;
        h >= 0 && regions_.of(triangle_of(h)) == region && steps < regions_.count(region); ++steps) {
-    const int t = triangle_of(h), k = side_of(h);
-    const bool beyond = (point(corners(t)[previous_corner(k)]) - middle).dot(along) > 0;
-    const int side = beyond ? previous_corner(k) : next_corner(k);
-    const Vec3 x = point(corners(t)[side]) - middle,
-               y = point(corners(t)[next_corner(side)]) - middle;
+    const bool beyond = (shell_.point(corner_before(h)) - middle).dot(along) > 0;
+    const int side = beyond ? corner_before(h) : corner_after(h);
+    const Vec3 x = shell_.point(side) - middle, y = shell_.point(corner_after(side)) - middle;
     const double share = x.dot(along) / (x.dot(along) - y.dot(along));
     reach = std::max(reach, (x + share * (y - x)).dot(across));
-    h = shell_.topology().other_half_edge(3 * t + side);
+    h = shell_.topology().other_half_edge(side);
   }
   return reach;
 }
@@ -303,10 +297,9 @@ void Recognizer::add_planes(Faces& faces) const {
   const std::vector<Moments> moments = moments_of_regions(row, rows);
   // Of a region across a side: that of a rectangle with the same second moment [m].
   const auto width = [&](int h) {
-    const int t = triangle_of(h), k = side_of(h), r = regions_.of(t);
+    const int t = triangle_of(h), r = regions_.of(t);
     if (regions_.is_alone(t)) return regions_.height(h);
-    const Vec3 side = point(corners(t)[next_corner(k)]) - point(corners(t)[k]);
-    const Vec3 across = regions_.normal(r).cross(side).normalized();
+    const Vec3 across = regions_.normal(r).cross(shell_.along(h)).normalized();
     return std::sqrt(12 * across.dot(moments[row[r]].second * across));
   };
   for (std::size_t t = 0; t < of_.size(); ++t) {

@@ -15,8 +15,9 @@ struct Faces {
   int of_triangle(int t) const { return of.empty() ? -1 : of[t]; }
   // Leaves out those for which gone[face].
   void give_up(const std::vector<char>& gone);
-  // The unit normal of the shape of triangle t at its corner k, on the side of the triangle's own.
-  Vec3 normal(const Shell& shell, int t, int k) const;
+  // The unit normal at a corner (3 triangle + k) of the shape of its triangle, on the side of the
+  // triangle's own.
+  Vec3 normal(const Shell& shell, int corner) const;
 };
 
 // What the vertices lie on to `rounding` [m], and what they over-determine.

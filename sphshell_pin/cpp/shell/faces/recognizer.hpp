@@ -90,6 +90,8 @@ class Recognizer {
   Vec3 centroid(int t) const;
   double area(int t) const;
   double longest_side(int t) const;
+  // Of its corners from a shape, the largest distance [m].
+  double off(int t, const Primitive& shape) const;
   double turn(int t, int u) const;  // [rad]
   // Each once, ascending.
   std::vector<int> vertices_of(const std::vector<int>& triangles) const;
@@ -98,6 +100,14 @@ class Recognizer {
   void mark(const std::vector<int>& triangles);
   bool is_own_plane(int t) const { return inscribed_[regions_.of(t)] == Inscribed::Plane; }
   bool is_marked(int t) const { return mark_[t] == round_; }
+  // Calls visit(u) for what is beside triangles across a smooth side, and not marked when its turn
+  // comes.
+  template <class Visit>
+  void for_each_beside(const std::vector<int>& triangles, Visit&& visit) const {
+    for (const int t : triangles)
+      for (int k = 0; k < 3; ++k)
+        if (const int u = beside_[3 * t + k]; u >= 0 && !is_marked(u)) visit(u);
+  }
 
   // growth.cpp
   Explained explain(int t, const Primitive& shape, double tolerance) const;

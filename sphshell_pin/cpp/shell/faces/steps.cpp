@@ -74,8 +74,7 @@ Recognizer::Steps Recognizer::widest_steps(const Growth& growth) {
   std::vector<std::pair<int, double>> oblique;  // region beyond, step
   for (const int t : growth.triangles)
     for (int k = 0; k < 3; ++k) {
-      const int h = shell_.topology().other_half_edge(3 * t + k);
-      const int u = h < 0 ? -1 : triangle_of(h);
+      const int u = shell_.topology().neighbor(3 * t + k);
       if (u >= 0 && (regions_.of(u) == regions_.of(t) || (is_marked(u) && u < t))) continue;
       const int v = corners(t)[k], w = corners(t)[next_corner(k)];
       const double step = step_between(growth.shape, point(v), point(w), 2 * growth.window);
@@ -151,10 +150,10 @@ void Recognizer::leave_wide_bands_out(Growth& growth) {
     bool wide = false, ends = false;
     for (const int t : members)
       for (int k = 0; k < 3; ++k) {
-        const int h = shell_.topology().other_half_edge(3 * t + k), u = h < 0 ? -1 : triangle_of(h);
+        const int u = shell_.topology().neighbor(3 * t + k);
         const int beyond = u < 0 ? -1 : regions_.of(u);
         if (beyond == regions_.of(t)) continue;
-        const Vec3 &x = point(corners(t)[k]), &y = point(corners(t)[next_corner(k)]);
+        const Vec3 &x = shell_.point(3 * t + k), &y = shell_.point(corner_after(3 * t + k));
         const double step = step_between(s, x, y, 2 * growth.window);
         if (u >= 0 && is_marked(u)) {
           if (step != 0) return false;
@@ -196,11 +195,10 @@ void Recognizer::leave_wide_bands_out(Growth& growth) {
     int sides = 0, beside = 0;
     for (const int t : band.members)
       for (int k = 0; k < 3; ++k) {
-        const int h = shell_.topology().other_half_edge(3 * t + k);
-        const int other = h < 0 ? -1 : regions_.of(triangle_of(h));
+        const int u = shell_.topology().neighbor(3 * t + k), other = u < 0 ? -1 : regions_.of(u);
         const Vec3 &x = point(corners(t)[k]), &y = point(corners(t)[next_corner(k)]);
         if (other == band.region || step_between(s, x, y, 0) <= most) continue;
-        ++sides, beside += other < 0 || !is_marked(triangle_of(h)) || wide[other];
+        ++sides, beside += other < 0 || !is_marked(u) || wide[other];
       }
     return sides > 1 && beside == sides;
   };
