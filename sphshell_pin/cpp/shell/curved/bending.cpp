@@ -15,8 +15,7 @@ constexpr double kSettled = 1e-9;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
-// Most corners share one: SharedNormals.
-bool are_same(const Vec3& m, const Vec3& n) { return &m == &n || (m - n).norm() <= kSameNormal; }
+bool are_same(const Vec3& m, const Vec3& n) { return (m - n).norm() <= kSameNormal; }
 
 // Appends n where no equal one is there; edges have few normals at an end.
 void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
@@ -131,14 +130,14 @@ std::vector<Vec3> border_directions(const Shell& shell) {
 // mean square of the sides, so that all are lengths.
 class Continuation {
  public:
-  Continuation(const Facet& facet, const CubicPatch& patch) : patch_(patch), up_(facet.normal) {
-    const Vec3* p = facet.corner;
-    east_ = (p[1] - p[0]).normalized();
-    north_ = up_.cross(east_);
-    length2_ =
-        ((p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm()) /
-        3;
-  }
+  Continuation(const Facet& facet, const CubicPatch& patch)
+      : patch_(patch),
+        up_(facet.normal),
+        east_(facet.side(0).normalized()),
+        north_(up_.cross(east_)),
+        length2_((facet.side(0).squaredNorm() + facet.side(1).squaredNorm() +
+                  facet.side(2).squaredNorm()) /
+                 3) {}
 
   // Adds vertex q with its normal n, opposite side k, to the normal equation square * a = along.
   void add(int k, const Vec3& q, const Vec3& n, double& along, double& square) const {
@@ -180,8 +179,8 @@ class Continuation {
   }
 
   const CubicPatch patch_;
-  Vec3 up_, east_, north_;
-  double length2_;  // slopes count as much as heights over a side
+  const Vec3 up_, east_, north_;
+  const double length2_;  // slopes count as much as heights over a side
 };
 
 }  // namespace
@@ -214,8 +213,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     last.clear();
     bool limited = false;
     const auto forward = [&](int h) { return shell.vertex(h) == edge.first_vertex; };
-    for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i];
+    for (const int h : topology.around(edge)) {
       const Vec3& here = normals_[h];
       const Vec3& there = normals_[corner_after(h)];
       add_distinct(first, forward(h) ? here : there);
@@ -229,8 +227,8 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
                         {last, border ? borders[edge.last_vertex] : d, limited});
     if (witness) {
       Trust least = Trust::Own, most = Trust::Facet;
-      for (int i = edge.begin; i < edge.begin + edge.count; ++i)
-        for (int c : {topology.incidence[i], corner_after(topology.incidence[i])}) {
+      for (const int h : topology.around(edge))
+        for (int c : {h, corner_after(h)}) {
           least = std::min(least, divided_[c] ? Trust::Facet : trust[c]);
           most = std::max(most, trust[c]);
         }
@@ -243,10 +241,10 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
         for (Vec3& one : offset) one *= limit / bulge;
     }
     settle_on_faces(shell, edge, faces_, p[edge.first_vertex], d, offset);
-    for (int i = 0; i < edge.count && !straight.empty(); ++i)
-      if (straight[topology.incidence[edge.begin + i]]) offset = {Vec3::Zero(), Vec3::Zero()};
-    for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
+    for (const int h : topology.around(edge))
+      if (!straight.empty() && straight[h]) offset = {Vec3::Zero(), Vec3::Zero()};
+    for (const int h : topology.around(edge)) {
+      const int g = shell.facet_half_edge(h);
       facets_[triangle_of(g)].set_side(side_of(g), offset[forward(h) ? 0 : 1],
                                        offset[forward(h) ? 1 : 0]);
     }

@@ -139,7 +139,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     // Two parallel circles lie on a sphere, and so do three that are symmetric.
     std::vector<Vec3> axes;
     for (const Mat3& m : {spread, turn}) {
-      const Mat3 vectors = Eigen::SelfAdjointEigenSolver<Mat3>(m).eigenvectors();
+      const Mat3 vectors = eigenvectors(m);
       for (int k = 0; k < 3; ++k) axes.push_back(vectors.col(k));
     }
     for (const Primitive& ring : guess_primitives(FaceKind::Torus, sample(triangles)))
