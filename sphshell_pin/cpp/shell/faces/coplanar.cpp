@@ -14,17 +14,12 @@ constexpr double kSameSide = 0.9;
 constexpr double kBeside = 30;
 constexpr std::size_t kLooksPerTriangle = 8, kFewLooks = 300;
 
-// A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
 void Moments::add(double area, const std::array<Vec3, 3>& corners) {
   area_ += area;
-  Vec3 sum = Vec3::Zero();
-  for (const Vec3& corner : corners) {
-    const Vec3 x = corner - about_;
-    sum += x;
-    second_ += area / 12 * x * x.transpose();
+  for (const Vec3& x : corners) {
+    first_ += area / 3 * (x - about_);
+    second_ += area / 3 * (x - about_) * (x - about_).transpose();
   }
-  first_ += area / 3 * sum;
-  second_ += area / 12 * sum * sum.transpose();
 }
 
 Vec3 Moments::normal(const Vec3& side) const {

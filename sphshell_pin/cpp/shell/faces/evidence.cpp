@@ -67,8 +67,7 @@ std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
       const int u = topology.neighbor(3 * t + k);
       if (u >= 0 && is_marked(u)) continue;
       const Edge& edge = topology.edge_at(3 * t + k);
-      border.push_back(edge.first_vertex);
-      border.push_back(edge.last_vertex);
+      border.insert(border.end(), {edge.first_vertex, edge.last_vertex});
     }
   std::sort(border.begin(), border.end());
   std::vector<int> out;

@@ -262,7 +262,10 @@ void Recognizer::add_planes(Faces& faces) const {
     const int r = row[regions_.of(int(t))];
     if (some[r] < 0) moments[r] = Moments(shell_.point(3 * int(t)));
     some[r] = static_cast<int>(t);
-    moments[r].add(area(int(t)), shell_.corners(int(t)));
+    // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
+    const Vec3 middle = centroid(int(t));
+    moments[r].add(area(int(t)) / 4, shell_.corners(int(t)));
+    moments[r].add(area(int(t)) * 3 / 4, {middle, middle, middle});
   }
   // How far a vertex is off the plane of the largest triangle [m].
   std::vector<double> apart(rows, 0);
