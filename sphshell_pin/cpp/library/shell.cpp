@@ -196,9 +196,7 @@ Surface weld(const Surface& surface, double tolerance) {
     const Element element{kept[0], kept[1], kept[2], kept.size() > 3 ? kept[3] : -1};
     std::vector<Triangle> parts = split(points, element);
     const std::size_t all = parts.size();
-    parts.erase(std::remove_if(parts.begin(), parts.end(),
-                               [&](const Triangle& t) { return is_flat(points, t); }),
-                parts.end());
+    core::erase_if(parts, [&](const Triangle& t) { return is_flat(points, t); });
     // A quad with one flat half becomes the triangle of the other half.
     if (parts.size() == all) {
       const int fourth = element.fourth;

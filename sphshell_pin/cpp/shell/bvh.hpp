@@ -18,6 +18,13 @@ inline void prefetch(const void* address) {
 #endif
 }
 
+// The same of all lines of an object.
+template <class T>
+void prefetch_all(const T& object) {
+  for (std::size_t line = 0; line < sizeof(T); line += 64)
+    prefetch(reinterpret_cast<const char*>(&object) + line);
+}
+
 // Axis-aligned boxes in single precision, rounded outward, about the middle of the shell.
 class Bvh {
  public:

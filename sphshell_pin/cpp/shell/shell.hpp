@@ -154,6 +154,8 @@ class Shell {
   int triangle_of_facet(int facet) const { return order_[facet]; }
   // The half-edge 3 triangle + side as 3 facet + side.
   int facet_half_edge(int h) const { return 3 * facet_of_[triangle_of(h)] + side_of(h); }
+  // And back.
+  int half_edge(int h) const { return 3 * order_[triangle_of(h)] + side_of(h); }
 
  private:
   void build_facets(const std::vector<int>& order);

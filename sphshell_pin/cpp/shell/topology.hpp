@@ -3,11 +3,12 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>
+
+#include "shell/lists.hpp"
 
 namespace sphshell {
 

@@ -74,7 +74,7 @@ const std::vector<int>& CurvatureField::joints_about(int facet) {
     for (int k = 0; k < 3; ++k) {
       const double reach = reach_ + shell_->curved()->facets()[f].bulge + cells[f].bulge[k];
       if (chord_distance2(shell_->facets()[f], k, about_) > reach * reach) continue;
-      const int h = shell_->topology().other_half_edge(3 * shell_->triangle_of_facet(f) + k);
+      const int h = shell_->topology().other_half_edge(shell_->half_edge(3 * f + k));
       if (h < 0) continue;
       const int other = shell_->facet_half_edge(h), g = triangle_of(other);
       const bool within = region_of(f) == region_of(g);

@@ -29,7 +29,7 @@ inline bool is_smooth(const Vec3& a, const Vec3& b) { return a.dot(b) > 0.99863;
 
 // The vertex at a corner.
 inline int vertex_of(const Shell& shell, int corner) {
-  return shell.triangles()[shell.triangle_of_facet(corner / 3)][corner % 3];
+  return shell.vertex(shell.half_edge(corner));
 }
 
 // The normal of an element at its corner.
@@ -41,7 +41,7 @@ inline Vec3 normal_at(const Shell& shell, int corner) {
 
 // The edge that a facet's side is.
 inline const Edge& edge_at(const Shell& shell, int facet, int side) {
-  return shell.topology().edge_at(3 * shell.triangle_of_facet(facet) + side);
+  return shell.topology().edge_at(shell.half_edge(3 * facet + side));
 }
 
 // The corner at a vertex of the element that a half-edge belongs to.
@@ -82,7 +82,7 @@ void connected_corners(const Shell& shell, int first, std::vector<int>& out, Joi
 
 // The half-edge, given in facets, of the neighbor that a facet goes on into over a side; -1: none.
 inline int smooth_over(const Shell& shell, int facet, int side) {
-  const int h = shell.topology().other_half_edge(3 * shell.triangle_of_facet(facet) + side);
+  const int h = shell.topology().other_half_edge(shell.half_edge(3 * facet + side));
   if (h < 0) return -1;
   const int other = shell.facet_half_edge(h);
   for (int corner : {3 * facet + side, 3 * facet + next_corner(side)})

@@ -16,8 +16,8 @@ constexpr double kLeastSlope = 1e-7;
 
 // The facets near the point are looked through; where it may be anywhere around an axis, those near
 // the sphere, and towards each of them.
-void FaceFeet::add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
-                           std::vector<Minimum>& minima) {
+void FaceFeet::add_closest(const Search<Sphere>& search, int face) {
+  const auto& [shell, sphere, want_dn_dc, minima] = search;
   const CurvedShell& surface = *shell.curved();
   const Region& region = surface.face_search()->of_face[face];
   const Primitive& shape = surface.faces().shapes[face];
@@ -67,8 +67,8 @@ void FaceFeet::clear(const CurvedShell& surface) {
   round_ = 1;
 }
 
-void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool want_dx_dn,
-                          std::vector<Minimum>& minima) {
+void FaceFeet::add_lowest(const Search<Plane>& search, int f) {
+  const auto& [shell, plane, want_dx_dn, minima] = search;
   const CurvedShell& surface = *shell.curved();
   const FaceCell& cell = surface.face_cells()[f];
   const Primitive& shape = surface.faces().shapes[cell.face];
@@ -93,16 +93,16 @@ void FaceFeet::add_lowest(const Shell& shell, int f, const Plane& plane, bool wa
       torus ? shape.parameters(point, shell.size()) : Eigen::Vector2d(0, 0);
   if (!holds(shell, f, {point, outward, point, place}, plane.tolerance + surface.gap())) return;
   if (!anywhere) claimed_[cell.face] = round_;
-  const int element = shell.facets()[f].element;
-  Contact contact = contact_at(point, outward, plane, element, Feature::Face);
-  if (want_dx_dn) {
+  Minimum lowest = search.at(f, 0, Feature::Face, point, outward, [&]() -> Mat3 {
     const Mat3 across = Mat3::Identity() - n * n.transpose();
-    contact.dn_dc = -(torus ? shape.second : shape.radius) * across;
+    Mat3 by = -(torus ? shape.second : shape.radius) * across;
     if (torus && !anywhere)
-      contact.dn_dc -= shape.radius / slant * (Mat3::Identity() - out * out.transpose()) *
-                       (Mat3::Identity() - axis * axis.transpose()) * across;
-  }
-  minima.push_back({contact, f, 0, cell.sign < 0});
+      by -= shape.radius / slant * (Mat3::Identity() - out * out.transpose()) *
+            (Mat3::Identity() - axis * axis.transpose()) * across;
+    return by;
+  });
+  lowest.behind = cell.sign < 0;
+  minima.push_back(lowest);
 }
 
 // Whether a point is on the inner side of what bounds a facet on its side k. Inner: facets of a

@@ -10,14 +10,12 @@ namespace sphshell {
 class FaceFeet {
  public:
   // Adds the closest point of a face, if one of its facets holds it.
-  void add_closest(const Shell& shell, int face, const Sphere& sphere, bool want_dn_dc,
-                   std::vector<Minimum>& minima);
+  void add_closest(const Search<Sphere>& search, int face);
   // Before each query with a plane; in constant time.
   void clear(const CurvedShell& surface);
   // Adds the lowest point of the face that a facet lies on, if it is in the facet and no other has
   // claimed it; of planes, cylinders and cones it is on a border.
-  void add_lowest(const Shell& shell, int facet, const Plane& plane, bool want_dx_dn,
-                  std::vector<Minimum>& minima);
+  void add_lowest(const Search<Plane>& search, int facet);
 
  private:
   std::vector<int> room_;               // of facets

@@ -7,6 +7,12 @@ BroadPhase::BroadPhase(bool follow) : follow_(follow) {
   candidates.reserve(256);
 }
 
+// Those of the first and the last facet that a leaf can hold.
+static void prefetch_leaf(const LargeArray<NormalCone>& cones, int first) {
+  prefetch(cones.data() + first);
+  prefetch(cones.data() + first + 3);
+}
+
 bool BroadPhase::begin(const Shell& shell, const Sphere& sphere, double& margin) {
   margin = 0;
   if (!follow_) return true;
@@ -30,12 +36,8 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
   double margin;
   if (!begin(shell, sphere, margin)) return;
   overlapping.clear();
-  const NormalCone* all = cones.data();
   shell.bvh().find_overlapping(sphere.center, sphere.radius + margin + bulge, overlapping,
-                               [all](int first) {
-                                 prefetch(all + first);
-                                 prefetch(all + first + 3);
-                               });
+                               [&](int first) { prefetch_leaf(cones, first); });
   find_candidates(shell, cones, bulge, sphere, margin, cells);
 }
 
@@ -58,16 +60,13 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
                       const Plane& plane, const CellBounds* cells) {
   followed_ = nullptr;
   overlapping.clear(), candidates.clear();
-  const NormalCone* all = cones.data();
-  shell.bvh().find_below(plane.normal, plane.offset + bulge, overlapping, [all](int first) {
-    prefetch(all + first);
-    prefetch(all + first + 3);
-  });
+  shell.bvh().find_below(plane.normal, plane.offset + bulge, overlapping,
+                         [&](int first) { prefetch_leaf(cones, first); });
   const float n[3] = {float(plane.normal.x()), float(plane.normal.y()), float(plane.normal.z())};
   const double local = plane.offset - plane.normal.dot(shell.origin());
   const float limit = float(local + 1e-6 * (shell.size() + std::abs(local)));
   for (int f : overlapping) {
-    const NormalCone& cone = all[f];
+    const NormalCone& cone = cones[f];
     const float along = n[0] * cone.axis[0] + n[1] * cone.axis[1] + n[2] * cone.axis[2];
     // The tangent of the angle between them, squared, without a division; 1e-5 for the rounding.
     const float most = cone.tan_opening * std::abs(along) + 1e-5f;
@@ -75,8 +74,7 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
     // The ball of a cone holds all of a bent element.
     if (n[0] * cone.middle[0] + n[1] * cone.middle[1] + n[2] * cone.middle[2] - cone.reach > limit)
       continue;
-    for (int line = 0; line < int(sizeof(Facet)); line += 64)
-      prefetch(reinterpret_cast<const char*>(&shell.facets()[f]) + line);
+    prefetch_all(shell.facets()[f]);
     if (cells != nullptr) prefetch(&cells[f]);
     candidates.push_back(f);
   }
@@ -86,8 +84,7 @@ void BroadPhase::find(const Shell& shell, const LargeArray<NormalCone>& cones, d
     const double deepest = std::max({plane.depth(at[0]), plane.depth(at[1]), plane.depth(at[2])});
     return deepest + 1.25 * (cells ? cells[f].bulge : bulge) <= 0;
   };
-  candidates.erase(std::remove_if(candidates.begin(), candidates.end(), is_above),
-                   candidates.end());
+  erase_if(candidates, is_above);
 }
 
 // The center may be inside the cone of normals of the features that a facet owns
@@ -119,8 +116,7 @@ void BroadPhase::find_candidates(const Shell& shell, const LargeArray<NormalCone
     const float farthest = radius * 1.000001f + cone.reach + wide;
     if (square * 0.999999f > farthest * farthest) continue;
     if (square * 0.999999f - height * height > allowed * allowed) continue;
-    prefetch(&facets[f]);
-    prefetch(reinterpret_cast<const char*>(&facets[f]) + 64);
+    prefetch_all(facets[f]);
     if (cells != nullptr) prefetch(&cells[f]);
     candidates.push_back(f);
   }

@@ -13,9 +13,9 @@ namespace {
 bool is_on_rim(const Shell& shell, const Minimum& at) {
   if (at.contact.feature == Feature::Face) return false;
   const Topology& topology = shell.topology();
-  const int t = shell.triangle_of_facet(at.facet);
-  if (at.contact.feature == Feature::Edge) return topology.edge_at(3 * t + at.index).on_rim();
-  return topology.vertex_on_rim[shell.triangles()[t][at.index]];
+  const int h = shell.half_edge(3 * at.facet + at.index);
+  if (at.contact.feature == Feature::Edge) return topology.edge_at(h).on_rim();
+  return topology.vertex_on_rim[shell.vertex(h)];
 }
 
 // The pseudo-normal of the feature that a contact is on: the sum of the faces' normals weighted by
@@ -23,11 +23,9 @@ bool is_on_rim(const Shell& shell, const Minimum& at) {
 // 243): its sign tells inside from outside for a closest point.
 Vec3 feature_normal(const Shell& shell, const Minimum& at) {
   const Topology& topology = shell.topology();
-  const int t = shell.triangle_of_facet(at.facet);
-  if (at.contact.feature == Feature::Vertex)
-    return topology.vertex_normal[shell.triangles()[t][at.index]];
-  if (at.contact.feature == Feature::Edge)
-    return topology.edge_normal(topology.edge_at(3 * t + at.index));
+  const int h = shell.half_edge(3 * at.facet + at.index);
+  if (at.contact.feature == Feature::Vertex) return topology.vertex_normal[shell.vertex(h)];
+  if (at.contact.feature == Feature::Edge) return topology.edge_normal(topology.edge_at(h));
   return at.behind ? Vec3(-at.contact.normal) : at.contact.normal;
 }
 
@@ -42,9 +40,7 @@ bool faces(const Shell& shell, const Probe& probe, const Minimum& at) {
 
 // Of a plane the features that face it count.
 void keep_one_side(const Shell& shell, const Plane& plane, std::vector<Minimum>& minima) {
-  minima.erase(std::remove_if(minima.begin(), minima.end(),
-                              [&](const Minimum& at) { return !faces(shell, plane, at); }),
-               minima.end());
+  erase_if(minima, [&](const Minimum& at) { return !faces(shell, plane, at); });
 }
 
 // side = outside | inside: the nearest contact tells on which side the center is. On the right side
@@ -66,9 +62,7 @@ void keep_one_side(const Shell& shell, const Sphere& sphere, std::vector<Minimum
     minima.assign(1, out);
     return;
   }
-  minima.erase(std::remove_if(minima.begin(), minima.end(),
-                              [&](const Minimum& at) { return !faces_center(at); }),
-               minima.end());
+  erase_if(minima, [&](const Minimum& at) { return !faces_center(at); });
   for (Minimum& at : minima)
     if (at.contact.depth == sphere.radius)
       // The center is on the surface, where its direction is undefined.
@@ -82,10 +76,7 @@ void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
   const Topology& topology = shell.topology();
   const std::vector<int>& element = shell.element();
   const auto closest = [&](int t) {
-    const Vec3 corner[3] = {shell.vertices()[shell.triangles()[t][0]],
-                            shell.vertices()[shell.triangles()[t][1]],
-                            shell.vertices()[shell.triangles()[t][2]]};
-    return closest_on_triangle(center, corner, topology.face_normal[t]);
+    return closest_on_triangle(center, shell.corners(t).data(), topology.face_normal[t]);
   };
   const int last = static_cast<int>(element.size()) - 1;
   // The triangles of a quad are neighbors in the list.
@@ -159,12 +150,12 @@ const std::vector<Contact>& Query::find(const Shell& shell, const Vec3& center, 
     find_elements(shell, sphere, parts_->broad, contacts);
     return contacts;
   }
-  std::vector<Minimum>& minima = parts_->minima;
-  minima.clear();
+  parts_->minima.clear();
+  const Search<Sphere> search{shell, sphere, parts_->want_dn_dc, parts_->minima};
   if (method == Method::Smooth)
-    parts_->curved.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+    parts_->curved.find(search, parts_->broad);
   else
-    parts_->flat.find(shell, sphere, parts_->broad, parts_->want_dn_dc, minima);
+    parts_->flat.find(search, parts_->broad);
   return list(shell, sphere, rings);
 }
 
@@ -173,7 +164,8 @@ const std::vector<Contact>& Query::find_below(const Shell& shell, const Vec3& no
   contacts.clear();
   parts_->minima.clear();
   const Plane plane{normal, offset, shell.size(), kRoundOff * shell.size()};
-  parts_->curved.find(shell, plane, parts_->broad, parts_->want_dn_dc, parts_->minima);
+  parts_->curved.find(Search<Plane>{shell, plane, parts_->want_dn_dc, parts_->minima},
+                      parts_->broad);
   return list(shell, plane, false);
 }
 

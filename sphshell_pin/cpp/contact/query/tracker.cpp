@@ -23,6 +23,11 @@ double ContactTracker::disc(double depth, double radius) {
   return std::sqrt(std::max(0.0, radius * radius - distance * distance));
 }
 
+ContactTracker::Place ContactTracker::place_of(const Contact& c, double radius, int number) {
+  return {c.point,      c.normal, c.depth,   disc(c.depth, radius),
+          c.weight < 0, c.rim,    c.feature, number};
+}
+
 const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, const Vec3& center,
                                               double radius) {
   at_.assign(contacts.size(), -1);
@@ -63,10 +68,8 @@ const std::vector<int>& ContactTracker::match(std::vector<Contact>& contacts, co
   for (std::size_t j = 0; j < contacts.size(); ++j) {
     // A new contact. It is known to later stages of the step, and forgotten by restart().
     if (at_[j] >= 0) continue;
-    const Contact& c = contacts[j];
     at_[j] = static_cast<int>(places_.size());
-    places_.push_back({c.point, c.normal, c.depth, disc(c.depth, radius), c.weight < 0, c.rim,
-                       c.feature, count_++});
+    places_.push_back(place_of(contacts[j], radius, count_++));
   }
   return at_;
 }
@@ -91,10 +94,8 @@ void ContactTracker::accept(const std::vector<Contact>& contacts, const Vec3& ce
   next_.clear();
   deep_ = false;
   for (std::size_t j = 0; j < contacts.size(); ++j) {
-    const Contact& c = contacts[j];
-    next_.push_back({c.point, c.normal, c.depth, disc(c.depth, radius), c.weight < 0, c.rim,
-                     c.feature, places_[at_[j]].number});
-    deep_ = deep_ || (radius > 0 && c.depth > kDeep * radius);
+    next_.push_back(place_of(contacts[j], radius, places_[at_[j]].number));
+    deep_ = deep_ || (radius > 0 && contacts[j].depth > kDeep * radius);
   }
   places_.swap(next_);
   known_ = places_.size();

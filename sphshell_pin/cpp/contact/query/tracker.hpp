@@ -53,6 +53,7 @@ class ContactTracker {
 
   // The radius of the disc of contact [m]; infinite of no sphere.
   static double disc(double depth, double radius);
+  static Place place_of(const Contact& contact, double radius, int number);
   void keep_side(Contact& contact, const Place& place, double radius);
 
   std::vector<Place> places_, next_;

@@ -126,9 +126,7 @@ struct SourcePoints : AnyGeometry {
   void find(const Pose& pose_i, const SE3& pose_j, const Vec3&, double, Query& query) const {
     std::vector<Contact>& found = query.contacts;
     find(pose_i(), pose_j, found);
-    found.erase(std::remove_if(found.begin(), found.end(),
-                               [](const Contact& one) { return !(one.depth > 0); }),
-                found.end());
+    erase_if(found, [](const Contact& one) { return !(one.depth > 0); });
   }
   // Those of no depth, too.
   void find(const SE3& pose_i, const SE3& pose_j, std::vector<Contact>& contacts) const;

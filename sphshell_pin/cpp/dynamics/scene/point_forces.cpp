@@ -35,9 +35,7 @@ void PointForces::find_shared(const PlaneBelow& plane, const SE3& plane_from_she
     contact.depth = out.depth, contact.point = out.point, contact.group = -1;
     contact.dn_dc.setZero();
   }
-  contacts.erase(std::remove_if(contacts.begin(), contacts.end(),
-                                [](const Contact& one) { return !(one.depth > 0); }),
-                 contacts.end());
+  erase_if(contacts, [](const Contact& one) { return !(one.depth > 0); });
 }
 
 const SharedContact* PointForces::shared(const Contact& contact) const {

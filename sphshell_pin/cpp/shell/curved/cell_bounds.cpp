@@ -195,8 +195,8 @@ void CurvedShell::leave_joints_whole(const Shell& shell) {
     for (int k = 0; k < 3; ++k) {
       if (facets_[f].owned.twin[k] == kNotOwned) continue;
       const int joint = is_on_joint(*this, f, k) ? face_cells()[f].joint[k] : kCorner;
-      const Triangle& triangle = shell.triangles()[shell.triangle_of_facet(f)];
-      for (const int v : {triangle[k], triangle[next_corner(k)]}) {
+      const int h = shell.half_edge(3 * f + k);
+      for (const int v : {shell.vertex(h), shell.vertex(corner_after(h))}) {
         if (joint_at[v] == kNone) joint_at[v] = joint;
         if (joint_at[v] != joint || ++sides[v] > 2) joint_at[v] = kCorner;
       }
@@ -216,7 +216,7 @@ void CurvedShell::bound_cells(const Shell& shell) {
                                 : bounds_of(facet, facets_[f].patch(facet), facets_[f].bulge);
     cells_[f].bulge = facets_[f].bulge;
     for (int k = 0; k < 3; ++k) {
-      const int h = 3 * shell.triangle_of_facet(static_cast<int>(f)) + k;
+      const int h = shell.half_edge(static_cast<int>(3 * f) + k);
       const Edge& edge = topology.edge_at(h);
       cells_[f].beyond[k] = edge.count == 1  ? kBoundary
                             : edge.count > 2 ? kNotOwned

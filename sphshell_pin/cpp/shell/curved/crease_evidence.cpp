@@ -198,9 +198,7 @@ void CreaseSearch::weigh_runs() {
       }
     }
     for (std::size_t n = 0; n < open.size(); ++n) run_[open[n]] = next[n];
-    open.erase(std::remove_if(open.begin(), open.end(),
-                              [&](std::size_t e) { return total(e) >= kEnough; }),
-               open.end());
+    erase_if(open, [&](std::size_t e) { return total(e) >= kEnough; });
   }
   const auto has_independent_normals = [&](std::size_t e) {
     const auto [h, g] = joints_[e].half_edge;

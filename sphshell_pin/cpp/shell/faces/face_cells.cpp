@@ -122,7 +122,7 @@ class CellMaker {
 
   // The half-edge of the facet beyond a side, if the surface goes on there; else -1.
   int beyond(int f, int k) const {
-    const int h = 3 * shell_.triangle_of_facet(f) + k, g = shell_.topology().other_half_edge(h);
+    const int h = shell_.half_edge(3 * f + k), g = shell_.topology().other_half_edge(h);
     return g >= 0 && shell_.opposed(h, g) ? shell_.facet_half_edge(g) : -1;
   }
 
@@ -374,9 +374,7 @@ class CellMaker {
   void find_intruders() {
     std::map<int, std::vector<int>> around;  // facets at the vertices of such borders
     std::vector<int> borders;
-    const auto vertex = [&](int h) {
-      return shell_.triangles()[shell_.triangle_of_facet(triangle_of(h))][side_of(h)];
-    };
+    const auto vertex = [&](int h) { return shell_.vertex(shell_.half_edge(h)); };
     const auto on_border = [&](int h, double s) -> Vec3 {
       const int f = triangle_of(h), k = side_of(h);
       return on_joint(faces_.joints[of_facet(f).joint[k]],
@@ -408,8 +406,7 @@ class CellMaker {
       const int f = triangle_of(h), next = 3 * f + next_corner(side_of(h));
       std::vector<int> near = around[vertex(h)];
       near.insert(near.end(), around[vertex(next)].begin(), around[vertex(next)].end());
-      std::sort(near.begin(), near.end());
-      near.erase(std::unique(near.begin(), near.end()), near.end());
+      sort_unique(near);
       for (const int g : near) {
         FaceCell& cell = of_facet(g);
         if (g == f || cell.face != of_facet(f).face) continue;

@@ -78,8 +78,7 @@ std::vector<int> Recognizer::vertices_of(const std::vector<int>& triangles) cons
   std::vector<int> out;
   out.reserve(3 * triangles.size());
   for (const int t : triangles) out.insert(out.end(), corners(t).begin(), corners(t).end());
-  std::sort(out.begin(), out.end());
-  out.erase(std::unique(out.begin(), out.end()), out.end());
+  sort_unique(out);
   return out;
 }
 
@@ -155,7 +154,7 @@ bool Recognizer::take(Growth growth) {
     for (const int region : faces_[f].wide)
       if (shared[f] > 0 && !stays(int(f))) inscribed_[region] = Inscribed::No;
   const auto is_taken = [&](int t) { return is_own_plane(t) || (of_[t] >= 0 && stays(of_[t])); };
-  all.erase(std::remove_if(all.begin(), all.end(), is_taken), all.end());
+  erase_if(all, is_taken);
   if (all.size() < 3) return false;
   for (const int region : growth.wide)
     inscribed_[region] = growth.shape.kind == FaceKind::Sphere ? Inscribed::Belt : Inscribed::Plane;
@@ -173,8 +172,7 @@ void Recognizer::drop_zones_of_free_shapes() {
   std::vector<char> weak(faces_.size(), 0);
   for (std::size_t f = 0; f < faces_.size(); ++f) {
     std::vector<int>& all = faces_[f].triangles;
-    all.erase(std::remove_if(all.begin(), all.end(), [&](int t) { return of_[t] != int(f); }),
-              all.end());
+    erase_if(all, [&](int t) { return of_[t] != int(f); });
     weak[f] = !all.empty() && is_weak(faces_[f]);
   }
   // First all are judged, then dropped: the order does not matter.
