@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,12 +42,28 @@ def test_the_same_bits_on_one_core_and_on_all() -> None:
     assert alone.stdout.strip() == digest()
 
 
-def test_bytes_of_a_triangle() -> None:
-    """The compiled surface, curved elements included."""
-    vertices, triangles = sheet()
-    shell = Shell(vertices, triangles)
-    shell.contacts(vertices[0], 0.05)
-    assert shell._binding.bytes <= 550 * len(triangles)
+RESIDENT = """
+import os
+from pathlib import Path
+from sphshell_pin import Shell
+from tests.shell.test_building import sheet
+
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+vertices, triangles = sheet(300)
+Shell(*sheet(8)).contacts(vertices[0], 0.05)
+before = resident()
+shell = Shell(vertices, triangles)
+shell.contacts(vertices[0], 0.05)
+print((resident() - before) / len(triangles))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
+def test_memory_of_a_triangle() -> None:
+    """What the process keeps for a surface, curved elements and all that Python has included."""
+    assert float(python(RESIDENT, check=True).stdout) <= 800
 
 
 def test_arrays_outlive_their_shell() -> None:

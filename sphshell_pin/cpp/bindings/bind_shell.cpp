@@ -322,8 +322,7 @@ void bind_shell(nb::module_& m) {
       .def_prop_ro("creases", [](const Shell& s) { return s.curved() ? s.curved()->creases() : 0; })
       // Of a shell with curved elements.
       .def_prop_ro("has_flats", [](const Shell& s) { return s.curved()->flats(s).any(); })
-      .def_prop_ro("has_other_flats", [](const Shell& s) { return s.curved()->flats(s).others; })
-      .def_prop_ro("bytes", &Shell::bytes);
+      .def_prop_ro("has_other_flats", [](const Shell& s) { return s.curved()->flats(s).others; });
   // Arrays own their memory, or keep the shell alive: no policy of nanobind's own applies.
   const auto array = [&](const char* name, auto get) {
     shell.def_prop_ro(name, get, nb::rv_policy::automatic);

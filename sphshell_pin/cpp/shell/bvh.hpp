@@ -39,8 +39,7 @@ class Bvh {
   template <class Touch>
   void find_overlapping(const Vec3& center, double radius, std::vector<int>& out,
                         Touch&& touch) const {
-    const Vec3 local = center - origin_;
-    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    const Eigen::Vector3f c = (center - origin_).cast<float>();
     const float reach = float(radius) * 1.000001f;
     const float limit = reach * reach;
     walk([&](const Node& n, int side) { return distance2(n, side, c) <= limit; }, out, touch);
@@ -49,7 +48,7 @@ class Bvh {
   // The same of all leaves whose box comes below a plane, at `offset` along its unit normal.
   template <class Touch>
   void find_below(const Vec3& normal, double offset, std::vector<int>& out, Touch&& touch) const {
-    const float n[3] = {float(normal.x()), float(normal.y()), float(normal.z())};
+    const Eigen::Vector3f n = normal.cast<float>();
     const double local = offset - normal.dot(origin_);
     float size = 0;
     for (int k = 0; k < 3; ++k) size += root_.high[0][k] - root_.low[0][k];
@@ -69,7 +68,7 @@ class Bvh {
   template <class Visit>
   void nearest(const Vec3& point, Visit&& visit) const {
     const Vec3 local = point - origin_;
-    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    const Eigen::Vector3f c = local.cast<float>();
     double best = std::numeric_limits<double>::infinity();
     const auto visit_leaf = [&](int leaf) {
       const int first = first_of(leaf), end = first + count_of(leaf);
@@ -108,14 +107,12 @@ class Bvh {
 
   // False where no triangle meets the ball: the box of all of them does not.
   bool may_meet(const Vec3& center, double radius) const {
-    const Vec3 local = center - origin_;
-    const float c[3] = {float(local.x()), float(local.y()), float(local.z())};
+    const Eigen::Vector3f c = (center - origin_).cast<float>();
     const float reach = float(radius) * 1.000001f;
     return distance2(root_, 0, c) <= reach * reach;
   }
 
   const Vec3& origin() const { return origin_; }
-  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
 
  private:
   static constexpr int kMaxDepth = 1024;  // checked when the tree is built
@@ -167,7 +164,7 @@ class Bvh {
   }
 
   // The square of the distance from c to a child's box, 0 inside.
-  static float distance2(const Node& n, int side, const float c[3]) {
+  static float distance2(const Node& n, int side, const Eigen::Vector3f& c) {
     float sum = 0;
     for (int k = 0; k < 3; ++k) {
       const float d = std::max(std::max(n.low[side][k] - c[k], c[k] - n.high[side][k]), 0.0f);

@@ -28,8 +28,7 @@ void Shell::build_facets(const std::vector<int>& order) {
     // Edges of more than two triangles, or wound against each other, keep a list of all their half-
     // edges.
     manifold_.emplace_back();
-    for (int i = 0; i < edge.count; ++i)
-      manifold_.back().push_back(facet_half_edge(topology_.incidence[edge.begin + i]));
+    for (const int h : topology_.around(edge)) manifold_.back().push_back(facet_half_edge(h));
   }
   const std::vector<Owned> owned = assign_owners(
       [&](int t, int u) { return topology_.planar_face[t] == topology_.planar_face[u]; });
@@ -124,21 +123,11 @@ void Shell::build_cones() {
   cones_.resize(facets_.size());
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     const Facet& facet = facets_[f];
-    double tangent = 0;
-    for (int k = 0; k < 3; ++k) {
-      if (facet.owned.twin[k] >= 0) {
-        const Vec3& other = facets_[triangle_of(facet.owned.twin[k])].normal;
-        const double cosine = facet.normal.dot(other);
-        // The normals of an edge are between those of its two facets: the tangent of the angle to
-        // the other one.
-        tangent = std::max(tangent, cosine > 0.05 ? facet.normal.cross(other).norm() / cosine
-                                                  : std::numeric_limits<double>::infinity());
-      } else if (facet.owned.twin[k] != kNotOwned) {
-        tangent = std::numeric_limits<double>::infinity();
-      }
-      if (facet.owned.vertex[k] >= 0)
-        tangent = std::max(tangent, tan_vertex_cone(facet.owned.vertex[k], facet.normal));
-    }
+    // The normals of an edge are between those of its two facets.
+    const double tangent = opening_of(facet, facet.owned, nullptr, [&](int g) {
+      const Vec3& other = facets_[g].normal;
+      return facet.normal.cross(other).norm() / facet.normal.dot(other);
+    });
     const Vec3 middle = facet.middle();
     double reach = 0;
     for (const Vec3& corner : facet.corner) reach = std::max(reach, (corner - middle).norm());
@@ -197,13 +186,6 @@ void Shell::curve(CurveOptions options) {
   curved_ = std::make_shared<const CurvedShell>(*this, std::move(options));
   ready_.store(curved_.get(), std::memory_order_release);
   give_back_freed_memory(triangles_.size());
-}
-
-std::size_t Shell::bytes() const {
-  const std::size_t curved = curved_ ? curved_->bytes() : 0;
-  return curved + bvh_.bytes() + facets_.size() * (sizeof(Facet) + sizeof(NormalCone)) +
-         vertices_.size() * sizeof(Vec3) + topology_.incidence.size() * 2 * sizeof(int) +
-         topology_.edges.size() * sizeof(Edge) + topology_.face_normal.size() * sizeof(Vec3);
 }
 
 const Sheets& Shell::sheets() const {

@@ -120,7 +120,24 @@ class Shell {
   std::vector<Owned> assign_owners(const std::function<bool(int t, int u)>& flat) const;
   // Bound on the tangent of the angle between `axis` and any direction that points away from all
   // edges at the vertex; `tangents` (beside Topology::neighbors) replace the straight edges.
-  double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents = nullptr) const;
+  double tan_vertex_cone(int vertex, const Vec3& axis, const Tangents* tangents) const;
+  // The same between a facet's normal and those of the sides and corners that it owns, where
+  // of_neighbor(g) is that of facet g.
+  template <class OfNeighbor>
+  double opening_of(const Facet& facet, const Owned& owned, const Tangents* tangents,
+                    OfNeighbor&& of_neighbor) const {
+    constexpr double kAny = std::numeric_limits<double>::infinity();
+    double tangent = 0;
+    for (int k = 0; k < 3; ++k) {
+      const int twin = owned.twin[k], g = twin < 0 ? -1 : triangle_of(twin);
+      if (twin != kNotOwned)
+        tangent = std::max(
+            tangent, g >= 0 && facet.normal.dot(facets_[g].normal) > 0.05 ? of_neighbor(g) : kAny);
+      if (owned.vertex[k] >= 0)
+        tangent = std::max(tangent, tan_vertex_cone(owned.vertex[k], facet.normal, tangents));
+    }
+    return tangent;
+  }
 
   // Curved elements, made at first use.
   void curve(CurveOptions options);
@@ -139,7 +156,6 @@ class Shell {
   int facet_half_edge(int h) const { return 3 * facet_of_[triangle_of(h)] + side_of(h); }
   // And back.
   int half_edge(int h) const { return 3 * order_[triangle_of(h)] + side_of(h); }
-  std::size_t bytes() const;
 
  private:
   void build_facets(const std::vector<int>& order);

@@ -191,8 +191,8 @@ void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, 
   DisjointSets fans(corners);
   const auto vertex = [&](int c) { return triangles[triangle_of(c)][side_of(c)]; };
   for (const Edge& edge : out.edges)
-    for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i) {
-      const int h = out.incidence[edge.begin], g = out.incidence[i];
+    for (const int g : out.around(edge)) {
+      const int h = out.incidence[edge.begin];
       const bool opposed = vertex(h) != vertex(g);
       fans.merge(h, opposed ? corner_after(g) : g);
       fans.merge(corner_after(h), opposed ? g : corner_after(g));
@@ -207,8 +207,8 @@ void find_pinches(std::size_t vertices, const std::vector<Triangle>& triangles, 
     if (fans_at[vertex(c)] > 1) found[vertex(c)][fans.find(c)].push_back(c);
   DisjointSets pieces(triangles.size());
   for (const Edge& edge : out.edges)
-    for (int i = edge.begin + 1; i < edge.begin + edge.count; ++i)
-      pieces.merge(triangle_of(out.incidence[edge.begin]), triangle_of(out.incidence[i]));
+    for (const int g : out.around(edge))
+      pieces.merge(triangle_of(out.incidence[edge.begin]), triangle_of(g));
   for (auto& [at, around] : found) {
     Pinch& pinch = out.pinches.emplace_back();
     pinch.vertex = at;
@@ -265,10 +265,8 @@ Sheets::Sheets(const Topology& topology) : rim(topology.face_normal.size(), 0) {
                  triangle_of(topology.incidence[edge.begin + 1]));
       continue;
     }
-    for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i];
+    for (const int h : topology.around(edge))
       rim[triangle_of(h)] |= static_cast<std::uint8_t>(1 << side_of(h));
-    }
   }
   // Triangles that edges connect which are no border.
   sheet = sets.labels();

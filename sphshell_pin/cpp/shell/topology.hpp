@@ -13,6 +13,7 @@
 namespace sphshell {
 
 using Vec3 = Eigen::Vector3d;
+using Mat3 = Eigen::Matrix3d;
 using Triangle = std::array<int, 3>;
 
 // Numbers in rows, which others own: of one number each, or of so many columns.
@@ -83,6 +84,13 @@ inline int previous_corner(int k) { return k == 0 ? 2 : k - 1; }
 inline int corner_after(int c) { return 3 * triangle_of(c) + next_corner(side_of(c)); }
 inline int corner_before(int c) { return 3 * triangle_of(c) + previous_corner(side_of(c)); }
 
+// Numbers one after another, which others own.
+struct Span {
+  const int *first, *last;
+  const int* begin() const { return first; }
+  const int* end() const { return last; }
+};
+
 struct Edge {
   int first_vertex, last_vertex;  // first < last
   int begin, count : 28;          // its half-edges: incidence[begin .. begin + count)
@@ -131,6 +139,9 @@ struct Topology {
   const Pinch* pinch_at(int vertex) const;
 
   const Edge& edge_at(int half_edge) const { return edges[edge_of[half_edge]]; }
+  Span around(const Edge& edge) const {
+    return {incidence.data() + edge.begin, incidence.data() + edge.begin + edge.count};
+  }
   // The half-edges of an edge that has two.
   std::pair<int, int> half_edges(const Edge& edge) const {
     return {incidence[edge.begin], incidence[edge.begin + 1]};
@@ -149,7 +160,7 @@ struct Topology {
   // Pseudo-normal of an edge, not of unit length: the sum of its triangles' normals.
   Vec3 edge_normal(const Edge& edge) const {
     Vec3 sum = Vec3::Zero();
-    for (int i = 0; i < edge.count; ++i) sum += face_normal[triangle_of(incidence[edge.begin + i])];
+    for (const int h : around(edge)) sum += face_normal[triangle_of(h)];
     return sum;
   }
 

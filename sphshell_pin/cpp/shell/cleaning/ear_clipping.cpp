@@ -7,30 +7,28 @@
 namespace sphshell {
 namespace {
 
-using Point2 = PointTree<2>::Point;
+using Point2 = Eigen::Vector2d;
+using Box2 = PointTree<2>::Box;
 
 // Twice the signed area of the triangle a, b, c.
 double cross(const Point2& a, const Point2& b, const Point2& c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-double squared(const Point2& a, const Point2& b) {
-  return (b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1]);
+// The square of its longest edge.
+double longest2(const Point2& a, const Point2& b, const Point2& c) {
+  return std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
 }
 
 // 2 area / longest edge^2, signed: the measure by which elements count as without area.
 double shape(const Point2& a, const Point2& b, const Point2& c) {
-  const double longest = std::max({squared(a, b), squared(b, c), squared(c, a)});
+  const double longest = longest2(a, b, c);
   return longest > 0.0 ? cross(a, b, c) / longest : 0.0;
 }
 
 constexpr double kFlat = 2e-12;  // 2 area / longest edge^2 of a triangle without area
 constexpr double kTie = 1e-9;    // shapes nearer than this count as equal; place decides
 constexpr double kLast = 1e-6;   // factor on the shape of ears that would leave a sliver behind
-
-// Up to so many corners plain loops do. Beyond, a k-d tree finds what lies in an ear and a
-// tournament the best ear; only among ears that tie at one place may another one be chosen.
-constexpr int kFew = 512;
 
 // The largest of n values that change one at a time, in O(log n).
 // A complete binary tree over the values, each node the larger of its children.
@@ -81,16 +79,17 @@ class Clipper {
     bool proper = true;
     int start = 0;
     for (int left = n; left > 3; --left) {
-      int best = best_ear(start);
+      int best = order_[ears_.first(kTie)];
       if (score_[best] <= kFlat) {
+        // Nothing is an ear where the outline crosses itself: the corner with the best shape.
         proper = false;
-        best = bluntest(start);
+        best = order_[shapes_.first(0.0)];
       }
       emit(polygon, best, out);
       start = previous_[best];
       remove(best);
     }
-    proper = proper && shape(flat_[previous_[start]], flat_[start], flat_[next_[start]]) > kFlat;
+    proper = proper && shape_at(start) > kFlat;
     emit(polygon, start, out);
     return proper;
   }
@@ -119,8 +118,6 @@ class Clipper {
       first_copy_[i] = k > 0 && vertex(order_[k - 1]) == vertex(i) ? first_copy_[order_[k - 1]] : i;
       ++copies_[first_copy_[i]];
     }
-    many_ = n > kFew;
-    if (!many_) return;
     plant();
     std::sort(order_.begin(), order_.end(), [&](int i, int j) {
       const double *a = point(first_ + i), *b = point(first_ + j);
@@ -145,9 +142,8 @@ class Clipper {
   void evaluate_ear(int i) {
     score_[i] = ear_shape(i);
     if (blocker_[i] >= 0) waiting_[blocker_[i]].push_back(i);
-    if (!many_) return;
     ears_.set(rank_[i], score_[i]);
-    shapes_.set(rank_[i], shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]));
+    shapes_.set(rank_[i], shape_at(i));
   }
 
   // Cuts the ear at i off. Only its two neighbors change their shape; ears that were blocked by its
@@ -157,12 +153,10 @@ class Clipper {
     next_[before] = after;
     previous_[after] = before;
     blocker_[i] = -1;
-    if (many_) {
-      ears_.drop(rank_[i]);
-      shapes_.drop(rank_[i]);
-    }
+    ears_.drop(rank_[i]);
+    shapes_.drop(rank_[i]);
     const bool gone = --copies_[copy] == 0;
-    if (gone && many_ && 2 * --left_ < planted_) plant();
+    if (gone && 2 * --left_ < planted_) plant();
     evaluate_ear(before);
     evaluate_ear(after);
     if (!gone) return;
@@ -171,26 +165,13 @@ class Clipper {
       if (blocker_[k] == copy) evaluate_ear(k);
   }
 
-  int best_ear(int start) const {
-    if (many_) return order_[ears_.first(kTie)];
-    int best = start;
-    for (int i = next_[start]; i != start; i = next_[i])
-      if (better(i, best)) best = i;
-    return best;
-  }
+  double shape_at(int i) const { return shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]); }
 
   // Newell's normal gives the plane; in it the polygon runs counter-clockwise.
   void project(std::size_t polygon) {
     first_ = polygons_.offsets[polygon];
     const std::int64_t last = polygons_.offsets[polygon + 1];
     const auto at = [&](std::int64_t slot) { return place(points_, polygons_.corners[slot]); };
-    const auto unit = [](const Vec3& x) -> Vec3 {
-      const double size = std::hypot(x[0], x[1], x[2]);
-      return x / (size > 0.0 ? size : 1.0);
-    };
-    const auto dot = [](const Vec3& a, const Vec3& b) {
-      return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    };
     // The first axis lies along the longest edge, so that coordinates do not depend on the
     // polygon's first corner.
     const Vec3 origin = at(first_);
@@ -200,16 +181,15 @@ class Clipper {
       const Vec3 p = at(s) - origin, q = at(polygons_.next(polygon, s)) - origin;
       const Vec3 edge = q - p;
       normal += p.cross(q);
-      const double length = std::hypot(edge[0], edge[1], edge[2]);
-      if (length > longest) longest = length, along = edge;
+      if (edge.norm() > longest) longest = edge.norm(), along = edge;
     }
-    normal = unit(normal);
-    along = unit(along - dot(normal, along) * normal);
+    normal.normalize();
+    along = (along - normal.dot(along) * normal).normalized();
     const Vec3 across = normal.cross(along);
     flat_.clear();
     for (std::int64_t s = first_; s < last; ++s) {
       const Vec3 d = at(s) - origin;
-      flat_.push_back({dot(d, along), dot(d, across)});
+      flat_.push_back({d.dot(along), d.dot(across)});
     }
   }
 
@@ -223,8 +203,8 @@ class Clipper {
     const double quality = shape(a, b, c);
     if (quality <= kFlat) return kBlocked;
     // Rounding of the cross products: points on the border count as inside.
-    const double slack = 1e-14 * std::max({squared(a, b), squared(b, c), squared(c, a)});
-    const double base = squared(c, a), reach = tolerance_ * std::sqrt(base);
+    const double slack = 1e-14 * longest2(a, b, c);
+    const double base = (a - c).squaredNorm(), reach = tolerance_ * std::sqrt(base);
     bool sliver = false;
     const auto blocks = [&](int k) {
       // The two banks of a bridge to a hole share their vertices: those do not block.
@@ -235,65 +215,30 @@ class Clipper {
         return true;
       }
       const double beyond = -cross(c, a, p);
-      const double along = (p[0] - a[0]) * (c[0] - a[0]) + (p[1] - a[1]) * (c[1] - a[1]);
+      const double along = (p - a).dot(c - a);
       sliver = sliver || (beyond >= 0.0 && beyond <= reach && along > 0.0 && along < base);
       return false;
     };
-    if (many_) {
-      // A point within the slack is at most 0.5 % of an edge outside: shape > kFlat = 200 * 1e-14.
-      const double grow = 0.02 * std::sqrt(slack / 1e-14) + 2.0 * reach;
-      const Point2 low{std::min({a[0], b[0], c[0]}) - grow, std::min({a[1], b[1], c[1]}) - grow};
-      const Point2 high{std::max({a[0], b[0], c[0]}) + grow, std::max({a[1], b[1], c[1]}) + grow};
-      // Rounding is monotone: the computed product of no point in the box is beyond its extremes.
-      const auto extreme = [](const Point2& from, const Point2& to, const PointTree<2>::Box& box,
-                              bool most) {
-        return cross(from, to,
-                     {(to[1] > from[1]) == most ? box.low[0] : box.high[0],
-                      (to[0] > from[0]) == most ? box.high[1] : box.low[1]});
-      };
-      const auto meets = [&](const PointTree<2>::Box& box) {
-        if (box.low[0] > high[0] || box.low[1] > high[1] || box.high[0] < low[0] ||
-            box.high[1] < low[1]) {
-          return false;
-        }
-        const double across = extreme(c, a, box, true);
-        if (!sliver && across >= -reach && extreme(c, a, box, false) <= 0.0) return true;
-        return across >= -slack && extreme(a, b, box, true) >= -slack &&
-               extreme(b, c, box, true) >= -slack;
-      };
-      tree_.search(
-          meets, [&](int k) { return copies_[k] > 0 && blocks(k); }, static_cast<std::uint32_t>(i));
-    } else {
-      for (int k = next_[j]; k != h && !blocks(k); k = next_[k]) {
-      }
-    }
+    // A point within the slack is at most 0.5 % of an edge outside: shape > kFlat = 200 * 1e-14.
+    const double grow = 0.02 * std::sqrt(slack / 1e-14) + 2.0 * reach;
+    const Box2 ear = Box2(a).extend(b).extend(c);
+    const Box2 around(Point2(ear.min().array() - grow), Point2(ear.max().array() + grow));
+    // Rounding is monotone: the computed product of no point in the box is beyond its extremes.
+    const auto extreme = [](const Point2& from, const Point2& to, const Box2& box, bool most) {
+      return cross(from, to,
+                   {(to[1] > from[1]) == most ? box.min()[0] : box.max()[0],
+                    (to[0] > from[0]) == most ? box.max()[1] : box.min()[1]});
+    };
+    const auto meets = [&](const Box2& box) {
+      if (!box.intersects(around)) return false;
+      const double across = extreme(c, a, box, true);
+      if (!sliver && across >= -reach && extreme(c, a, box, false) <= 0.0) return true;
+      return across >= -slack && extreme(a, b, box, true) >= -slack &&
+             extreme(b, c, box, true) >= -slack;
+    };
+    tree_.search(meets, [&](int k) { return copies_[k] > 0 && blocks(k); });
     if (blocker_[i] >= 0) return kBlocked;
     return sliver ? kLast * quality : quality;
-  }
-
-  bool better(int i, int than) const {
-    if (score_[i] > score_[than] + kTie) return true;
-    if (score_[i] < score_[than] - kTie) return false;
-    const double* a = point(first_ + i);
-    const double* b = point(first_ + than);
-    return std::lexicographical_compare(a, a + 3, b, b + 3);
-  }
-
-  // Where nothing is an ear (the outline crosses itself): the corner with the best shape.
-  int bluntest(int start) const {
-    if (many_) return order_[shapes_.first(0.0)];
-    int best = start;
-    double most = -2.0;
-    int i = start;
-    do {
-      const double quality = shape(flat_[previous_[i]], flat_[i], flat_[next_[i]]);
-      if (quality > most) {
-        most = quality;
-        best = i;
-      }
-      i = next_[i];
-    } while (i != start);
-    return best;
   }
 
   void emit(std::size_t polygon, int i, EarClips& out) const {
@@ -321,7 +266,6 @@ class Clipper {
   std::vector<int> blocker_;     // of each blocked ear: the first copy of a vertex in it, else -1
   std::vector<std::vector<int>>
       waiting_;                         // of each first copy: ears that it blocks or once blocked
-  bool many_ = false;                   // corners; what follows is used only then
   PointTree<2> tree_;                   // of the first copies
   std::size_t planted_ = 0, left_ = 0;  // points when the tree was built, and now
   std::vector<int> order_, rank_;       // corners by x, y, z of their points

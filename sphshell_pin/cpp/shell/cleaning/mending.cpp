@@ -20,29 +20,24 @@ Weld weld(Points points, double tolerance) {
   Weld out;
   const std::size_t count = points.count;
   DisjointSets groups(count);
-  std::array<double, 3> low{};
-  low.fill(std::numeric_limits<double>::infinity());
-  for (std::size_t i = 0; i < 3 * count; ++i) low[i % 3] = std::min(low[i % 3], points[i]);
+  Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < count; ++i) low = low.cwiseMin(place(points, i));
   const double cell = kCellInTolerances * tolerance;
+  using Cell = Eigen::Matrix<std::uint64_t, 3, 1>;
+  const auto cell_of = [&](const Vec3& x) -> Cell {
+    return ((x - low) / cell).array().floor().max(0.0).cast<std::uint64_t>();
+  };
   // 21 bits per axis hold the at most 1e7 / 64 cells of a box of 1e7 tolerances.
-  const auto index = [&](double x, int axis) {
-    return static_cast<std::uint64_t>(std::max(0.0, std::floor((x - low[axis]) / cell)));
-  };
-  const auto key = [](std::uint64_t x, std::uint64_t y, std::uint64_t z) {
-    return (x << 42) | (y << 21) | z;
-  };
+  const auto key = [](const Cell& at) { return (at[0] << 42) | (at[1] << 21) | at[2]; };
   // The points by their cells.
   using Place = std::pair<std::uint64_t, std::int32_t>;
   LargeArray<Place> places(count);
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vec3 p = place(points, i);
-    places[i] = {key(index(p[0], 0), index(p[1], 1), index(p[2], 2)), static_cast<std::int32_t>(i)};
-  }
+  for (std::size_t i = 0; i < count; ++i)
+    places[i] = {key(cell_of(place(points, i))), static_cast<std::int32_t>(i)};
   std::sort(places.begin(), places.end());
   // Merges two points that are near each other; whether they are equal.
   const auto merge = [&](const Place& one, const Place& other) {
-    const Vec3 d = place(points, one.second) - place(points, other.second);
-    const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    const double squared = (place(points, one.second) - place(points, other.second)).squaredNorm();
     if (squared <= tolerance * tolerance) groups.merge(one.second, other.second);
     return squared == 0.0;
   };
@@ -58,15 +53,11 @@ Weld weld(Points points, double tolerance) {
   // And across cells, where the ball of the tolerance meets several: seldom, as they are wide.
   for (const Place& place : places) {
     const Vec3 p = sphshell::place(points, place.second);
-    std::array<std::uint64_t, 3> from{}, to{};
-    for (int axis = 0; axis < 3; ++axis) {
-      from[axis] = index(p[axis] - tolerance, axis);
-      to[axis] = index(p[axis] + tolerance, axis);
-    }
+    const Cell from = cell_of(p.array() - tolerance), to = cell_of(p.array() + tolerance);
     for (std::uint64_t x = from[0]; x <= to[0]; ++x)
       for (std::uint64_t y = from[1]; y <= to[1]; ++y)
         for (std::uint64_t z = from[2]; z <= to[2]; ++z) {
-          const std::uint64_t cell = key(x, y, z);
+          const std::uint64_t cell = key({x, y, z});
           if (cell == place.first) continue;
           auto other = std::lower_bound(places.begin(), places.end(), Place(cell, 0));
           for (; other != places.end() && other->first == cell; ++other) merge(place, *other);
@@ -77,8 +68,8 @@ Weld weld(Points points, double tolerance) {
     const std::int32_t first = groups.find(static_cast<std::int32_t>(i));
     out.representative[i] = first;
     if (first == static_cast<std::int32_t>(i)) continue;
-    const Vec3 off = place(points, i) - place(points, first);
-    out.largest_distance = std::max(out.largest_distance, std::hypot(off[0], off[1], off[2]));
+    out.largest_distance =
+        std::max(out.largest_distance, (place(points, i) - place(points, first)).norm());
   }
   return out;
 }

@@ -11,26 +11,18 @@ Overlaps overlaps(Points points, Rows<std::int32_t, 3> triangles, Indices triang
                   Points places, Indices place_component, Indices group) {
   // Lines in a generic direction, so that they do not run along the axis-aligned faces and edges
   // CAD is full of. They are in a tree across that direction: each triangle meets only those near.
-  using Vec = std::array<double, 3>;
   // Orthonormal rows, none of them along an axis.
-  constexpr std::array<Vec, 3> kAxes = {{{0.81649658, -0.35355339, 0.45643546},
-                                         {0.27735010, 0.93541435, 0.22839193},
-                                         {-0.50770552, -0.05988616, 0.85945101}}};
-  const auto turned = [&](const double* p) {
-    Vec out{};
-    for (int k = 0; k < 3; ++k)
-      out[k] = kAxes[k][0] * p[0] + kAxes[k][1] * p[1] + kAxes[k][2] * p[2];
-    return out;
-  };
+  const Mat3 turn{{0.81649658, -0.35355339, 0.45643546},
+                  {0.27735010, 0.93541435, 0.22839193},
+                  {-0.50770552, -0.05988616, 0.85945101}};
   // In the plane across the lines.
-  std::vector<double> place(2 * places.count);
+  std::vector<Eigen::Vector2d> at(places.count);
   std::vector<std::int32_t> lines(places.count);
   for (std::size_t k = 0; k < places.count; ++k) {
-    const Vec q = turned(places.data + 3 * k);
-    place[2 * k] = q[0], place[2 * k + 1] = q[1];
+    at[k] = (turn * place(places, k)).head<2>();
     lines[k] = static_cast<std::int32_t>(k);
   }
-  const PointTree<2> tree(place.data(), std::move(lines));
+  const PointTree<2> tree(at.data()->data(), std::move(lines));
   struct Crossing {
     std::int32_t line;
     double height;
@@ -40,22 +32,17 @@ Overlaps overlaps(Points points, Rows<std::int32_t, 3> triangles, Indices triang
   for (std::size_t t = 0; t < triangles.count; ++t) {
     const std::int32_t owner = triangle_component[t];
     if (group[owner] < 0) continue;
-    std::array<std::int32_t, 3> index{};
-    std::array<Vec, 3> corner{};
-    PointTree<2>::Box span{};
+    const std::int32_t* index = triangles.data + 3 * t;
+    Vec3 corner[3];
+    PointTree<2>::Box span;
     for (int k = 0; k < 3; ++k) {
-      index[k] = triangles[3 * t + k];
-      corner[k] = turned(points.data + 3 * static_cast<std::size_t>(index[k]));
+      corner[k] = turn * place(points, index[k]);
+      span.extend(corner[k].head<2>());
     }
-    for (int k = 0; k < 2; ++k)
-      std::tie(span.low[k], span.high[k]) = std::minmax({corner[0][k], corner[1][k], corner[2][k]});
-    const auto meets = [&](const PointTree<2>::Box& box) {
-      return box.low[0] <= span.high[0] && box.high[0] >= span.low[0] &&
-             box.low[1] <= span.high[1] && box.high[1] >= span.low[1];
-    };
+    const auto meets = [&](const PointTree<2>::Box& box) { return box.intersects(span); };
     tree.search(meets, [&](std::int32_t line) {
       if (group[place_component[line]] != group[owner]) return false;
-      const double* q = place.data() + 2 * static_cast<std::size_t>(line);
+      const Eigen::Vector2d& q = at[line];
       bool inside = false;
       for (int k = 0; k < 3; ++k) {
         // Low index first, so that both users of an edge compute the very same number.
@@ -66,7 +53,7 @@ Overlaps overlaps(Points points, Rows<std::int32_t, 3> triangles, Indices triang
         if (q[0] < corner[a][0] + share * (corner[b][0] - corner[a][0])) inside = !inside;
       }
       if (!inside) return false;
-      const Vec &a = corner[0], &b = corner[1], &d = corner[2];
+      const Vec3 &a = corner[0], &b = corner[1], &d = corner[2];
       const double ux = b[0] - a[0], uy = b[1] - a[1], vx = d[0] - a[0], vy = d[1] - a[1];
       // Barycentric coordinates of the line in the projection: the height of the triangle there. A
       // triangle on edge has one as well, for every component must be left as often as entered.

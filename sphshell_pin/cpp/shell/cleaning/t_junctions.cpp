@@ -9,7 +9,7 @@ namespace sphshell {
 static bool meets(const PointTree<3>::Box& box, const Vec3& a, const Vec3& b, double tolerance) {
   double enter = 0.0, leave = 1.0;
   for (int axis = 0; axis < 3; ++axis) {
-    const double low = box.low[axis] - tolerance, high = box.high[axis] + tolerance;
+    const double low = box.min()[axis] - tolerance, high = box.max()[axis] + tolerance;
     const double d = b[axis] - a[axis];
     if (d == 0.0) {
       if (a[axis] < low || a[axis] > high) return false;
@@ -51,16 +51,13 @@ Insertions find_t_junctions(const PolygonView& polygons, Points points,
     }
     const Vec3 a = place(points, polygons.corners[slot]);
     const Vec3 b = place(points, polygons.corners[polygons.next(polygon, slot)]), d = b - a;
-    const double squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
     hits.clear();
     const auto near = [&](const PointTree<3>::Box& box) { return meets(box, a, b, tolerance); };
     tree.search(near, [&](std::int32_t vertex) {
       if (owner[static_cast<std::size_t>(vertex)] == open_polygons[k]) return false;
       const Vec3 e = place(points, vertex) - a;
-      const double t = (e[0] * d[0] + e[1] * d[1] + e[2] * d[2]) / squared;
-      const Vec3 off = e - t * d;
-      if (t > 0.0 && t < 1.0 && std::hypot(off[0], off[1], off[2]) <= tolerance)
-        hits.push_back({t, vertex});
+      const double t = e.dot(d) / d.squaredNorm();
+      if (t > 0.0 && t < 1.0 && (e - t * d).norm() <= tolerance) hits.push_back({t, vertex});
       // More than `most` are not wanted: the search ends.
       return out.slot.size() + hits.size() > most;
     });

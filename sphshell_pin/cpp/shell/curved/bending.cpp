@@ -15,8 +15,7 @@ constexpr double kSettled = 1e-9;
 // An edge whose tangents would lean more than this (cosine) from its chord stays straight.
 constexpr double kMostLean = 0.6;
 
-// Most corners share one: SharedNormals.
-bool are_same(const Vec3& m, const Vec3& n) { return &m == &n || (m - n).norm() <= kSameNormal; }
+bool are_same(const Vec3& m, const Vec3& n) { return (m - n).norm() <= kSameNormal; }
 
 // Appends n where no equal one is there; edges have few normals at an end.
 void add_distinct(std::vector<Vec3>& normals, const Vec3& n) {
@@ -125,64 +124,47 @@ std::vector<Vec3> border_directions(const Shell& shell) {
   return sum;
 }
 
-// Where a patch, continued beyond its sides, misses a vertex with its normal, and what lifting its
-// middle by `a` along the facet's normal would do about it: a least-squares problem in `a`.
-// Height and slope of the patch at the neighbor's vertex both count; slopes are weighted with the
-// mean square of the sides, so that all are lengths.
-class Continuation {
- public:
-  Continuation(const Facet& facet, const CubicPatch& patch) : patch_(patch), up_(facet.normal) {
-    const Vec3* p = facet.corner;
-    east_ = (p[1] - p[0]).normalized();
-    north_ = up_.cross(east_);
-    length2_ =
-        ((p[1] - p[0]).squaredNorm() + (p[2] - p[1]).squaredNorm() + (p[0] - p[2]).squaredNorm()) /
-        3;
-  }
-
-  // Adds vertex q with its normal n, opposite side k, to the normal equation square * a = along.
-  void add(int k, const Vec3& q, const Vec3& n, double& along, double& square) const {
-    const double upright = n.dot(up_);
-    if (upright < 0.5) return;
-    // The parameters of the vertex's projection; raising the center does not change them.
-    // The corner opposite a side, mirrored: where the neighbor's vertex is if it is a
-    // parallelogram.
-    static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
-    Eigen::Vector2d at(kU[k], kV[k]);
-    for (int i = 0; i < 6; ++i) {
-      const Vec3 r = q - patch_.point(at.x(), at.y());
-      const Eigen::Vector2d step =
-          tangents(at).inverse() * Eigen::Vector2d(r.dot(east_), r.dot(north_));
-      at += step;
-      // Of a share of the element; what is left is its square.
-      if (step.squaredNorm() < kSettled * kSettled) break;
-    }
-    if (!(at.cwiseAbs().maxCoeff() < 4)) return;
-    // 6 u v w is the polynomial that the middle control point moves: zero on all sides.
-    const double u = at.x(), v = at.y(), w = 1 - u - v;
-    const Eigen::Matrix2d to_slope = tangents(at).transpose().inverse();
-    const Eigen::Vector2d slope =
-        to_slope * Eigen::Vector2d(patch_.along_u(u, v).dot(up_), patch_.along_v(u, v).dot(up_));
-    // The slope of the plane with normal n over the facet's plane.
-    const Eigen::Vector2d wanted = -Eigen::Vector2d(n.dot(east_), n.dot(north_)) / upright;
-    const Eigen::Vector2d gain = to_slope * Eigen::Vector2d(6 * v * (w - u), 6 * u * (w - v));
-    const double rise = 6 * u * v * w;
-    along += rise * up_.dot(q - patch_.point(u, v)) + length2_ * gain.dot(wanted - slope);
-    square += rise * rise + length2_ * gain.squaredNorm();
-  }
-
- private:
-  Eigen::Matrix2d tangents(const Eigen::Vector2d& at) const {
-    const Vec3 xu = patch_.along_u(at.x(), at.y()), xv = patch_.along_v(at.x(), at.y());
+// Where a patch, continued beyond its sides, misses a vertex q with its normal n, opposite side k,
+// and what lifting its middle by `a` along the facet's normal would do about it: added to the
+// normal equation square * a = along. Height and slope of the patch at the vertex both count;
+// slopes are weighted with the mean square of the sides, so that all are lengths.
+void add_beyond(const Facet& facet, const CubicPatch& patch, int k, const Vec3& q, const Vec3& n,
+                double& along, double& square) {
+  const Vec3& up = facet.normal;
+  const double upright = n.dot(up);
+  if (upright < 0.5) return;
+  const FacetAxes axes(facet);
+  const auto level = [&](const Vec3& d) { return Eigen::Vector2d(d.dot(axes.x), d.dot(axes.y)); };
+  const auto tangents = [&](const Eigen::Vector2d& at) {
     Eigen::Matrix2d out;
-    out << xu.dot(east_), xv.dot(east_), xu.dot(north_), xv.dot(north_);
+    out << level(patch.along_u(at.x(), at.y())), level(patch.along_v(at.x(), at.y()));
     return out;
+  };
+  // The parameters of the vertex's projection; raising the center does not change them.
+  // The corner opposite a side, mirrored: where the neighbor's vertex is if it is a parallelogram.
+  static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
+  Eigen::Vector2d at(kU[k], kV[k]);
+  for (int i = 0; i < 6; ++i) {
+    const Eigen::Vector2d step = tangents(at).inverse() * level(q - patch.point(at.x(), at.y()));
+    at += step;
+    // Of a share of the element; what is left is its square.
+    if (step.squaredNorm() < kSettled * kSettled) break;
   }
-
-  const CubicPatch patch_;
-  Vec3 up_, east_, north_;
-  double length2_;  // slopes count as much as heights over a side
-};
+  if (!(at.cwiseAbs().maxCoeff() < 4)) return;
+  // 6 u v w is the polynomial that the middle control point moves: zero on all sides.
+  const double u = at.x(), v = at.y(), w = 1 - u - v;
+  const Eigen::Matrix2d to_slope = tangents(at).transpose().inverse();
+  const Eigen::Vector2d slope =
+      to_slope * Eigen::Vector2d(patch.along_u(u, v).dot(up), patch.along_v(u, v).dot(up));
+  // The slope of the plane with normal n over the facet's plane.
+  const Eigen::Vector2d wanted = -level(n) / upright;
+  const Eigen::Vector2d gain = to_slope * Eigen::Vector2d(6 * v * (w - u), 6 * u * (w - v));
+  double length2 = 0;
+  for (int i = 0; i < 3; ++i) length2 += facet.side(i).squaredNorm();
+  const double rise = 6 * u * v * w;
+  along += rise * up.dot(q - patch.point(u, v)) + length2 / 3 * gain.dot(wanted - slope);
+  square += rise * rise + length2 / 3 * gain.squaredNorm();
+}
 
 }  // namespace
 
@@ -214,8 +196,7 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
     last.clear();
     bool limited = false;
     const auto forward = [&](int h) { return shell.vertex(h) == edge.first_vertex; };
-    for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i];
+    for (const int h : topology.around(edge)) {
       const Vec3& here = normals_[h];
       const Vec3& there = normals_[corner_after(h)];
       add_distinct(first, forward(h) ? here : there);
@@ -229,8 +210,8 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
                         {last, border ? borders[edge.last_vertex] : d, limited});
     if (witness) {
       Trust least = Trust::Own, most = Trust::Facet;
-      for (int i = edge.begin; i < edge.begin + edge.count; ++i)
-        for (int c : {topology.incidence[i], corner_after(topology.incidence[i])}) {
+      for (const int h : topology.around(edge))
+        for (int c : {h, corner_after(h)}) {
           least = std::min(least, divided_[c] ? Trust::Facet : trust[c]);
           most = std::max(most, trust[c]);
         }
@@ -243,10 +224,10 @@ void CurvedShell::bend_edges(const Shell& shell, const std::vector<std::uint8_t>
         for (Vec3& one : offset) one *= limit / bulge;
     }
     settle_on_faces(shell, edge, faces_, p[edge.first_vertex], d, offset);
-    for (int i = 0; i < edge.count && !straight.empty(); ++i)
-      if (straight[topology.incidence[edge.begin + i]]) offset = {Vec3::Zero(), Vec3::Zero()};
-    for (int i = 0; i < edge.count; ++i) {
-      const int h = topology.incidence[edge.begin + i], g = shell.facet_half_edge(h);
+    for (const int h : topology.around(edge))
+      if (!straight.empty() && straight[h]) offset = {Vec3::Zero(), Vec3::Zero()};
+    for (const int h : topology.around(edge)) {
+      const int g = shell.facet_half_edge(h);
       facets_[triangle_of(g)].set_side(side_of(g), offset[forward(h) ? 0 : 1],
                                        offset[forward(h) ? 1 : 0]);
     }
@@ -268,13 +249,13 @@ void CurvedShell::raise_centers(const Shell& shell) {
   for_each_in_parallel(facets_.size(), [&](std::size_t f) {
     if (facets_[f].flat) return;
     const Facet& facet = shell.facets()[f];
-    const Continuation continuation(facet, facets_[f].patch(facet));
+    const CubicPatch patch = facets_[f].patch(facet);
     const int t = shell.triangle_of_facet(static_cast<int>(f));
     double along = 0, square = 0;
     for (int k = 0; k < 3; ++k) {
       const int c = corner_beyond(shell, 3 * t + k);
       if (c < 0) continue;
-      continuation.add(k, shell.point(c), normals_[c], along, square);
+      add_beyond(facet, patch, k, shell.point(c), normals_[c], along, square);
     }
     // Neighbors whose normals contradict it must not pull an element away from its own sides.
     // The least-squares solution of all neighbors together, limited.

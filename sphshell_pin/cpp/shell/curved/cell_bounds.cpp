@@ -136,7 +136,7 @@ void CurvedShell::build_cones(const Shell& shell) {
     return topology.planar_face[t] == topology.planar_face[u] && is_flat(t) && is_flat(u);
   });
   for (std::size_t f = 0; f < facets_.size(); ++f) facets_[f].owned = owned[f];
-  if (!face_cells_.empty()) leave_joints_whole(shell);
+  if (!face_cells().empty()) leave_joints_whole(shell);
   cones_ = shell.cones();
   for_each_in_parallel(cones_.size(), [&](std::size_t f) {
     const Facet& facet = flat[f];
@@ -144,27 +144,17 @@ void CurvedShell::build_cones(const Shell& shell) {
     const Net net = control_points(facet, facets_[f]);
     // A cone must hold the normals of the element, and of the sides and corners that it owns: there
     // those of the neighbors.
-    double tangent = tan_opening_of(net, axis);
-    const Owned& mine = facets_[f].owned;
-    for (int k = 0; k < 3; ++k) {
-      if (mine.twin[k] >= 0) {
-        const std::size_t g = static_cast<std::size_t>(triangle_of(mine.twin[k]));
-        tangent = std::max(tangent, facet.normal.dot(flat[g].normal) > 0.05
-                                        ? tan_opening_of(control_points(flat[g], facets_[g]), axis)
-                                        : kAny);
-      } else if (mine.twin[k] != kNotOwned) {
-        tangent = kAny;
-      }
-      if (mine.vertex[k] >= 0)
-        tangent = std::max(tangent, shell.tan_vertex_cone(mine.vertex[k], axis, &tangents_));
-    }
-    const bool closed = !face_cells_.empty() && face_cells_[f].closed;
-    const Primitive* face = closed ? &faces_.shapes[face_cells_[f].face] : nullptr;
+    double tangent = std::max(tan_opening_of(net, axis),
+                              shell.opening_of(facet, facets_[f].owned, &tangents_, [&](int g) {
+                                return tan_opening_of(control_points(flat[g], facets_[g]), axis);
+                              }));
+    const Primitive* face = face_of(static_cast<int>(f));
+    const FaceCell* cell = face == nullptr ? nullptr : &face_cells()[f];
     // The face's own normals at corners and at the middles of sides, a little wider for what is
     // between.
     double sagitta = 0;
     std::array<Vec3, 4> middles;
-    if (face != nullptr) middles = middles_of(*face, face_cells_[f], facet, shell.size());
+    if (face != nullptr) middles = middles_of(*face, *cell, facet, shell.size());
     for (int i = 0; face != nullptr && i < 7; ++i) {
       const Vec3* corner = facet.corner;
       const Vec3 chord = i < 3   ? Vec3((corner[i] + corner[next_corner(i)]) / 2)
@@ -174,12 +164,12 @@ void CurvedShell::build_cones(const Shell& shell) {
       Vec3 n;
       face->distance(x, n);
       sagitta = std::max(sagitta, kBulgeMargin * (x - chord).norm());
-      const double along = face_cells_[f].sign * n.dot(axis), across = n.cross(axis).norm();
+      const double along = cell->sign * n.dot(axis), across = n.cross(axis).norm();
       tangent = std::max(tangent, along > 0 ? 1.001 * across / along + 1e-6 : kAny);
     }
     // Borders of a closed cell bulge beyond its chords, in a flat one, too.
-    for (int k = 0; k < 3 && closed; ++k)
-      sagitta = std::max<double>(sagitta, face_cells_[f].bulge[k]);
+    for (int k = 0; k < 3 && face != nullptr; ++k)
+      sagitta = std::max<double>(sagitta, cell->bulge[k]);
     NormalCone& cone = cones_[f];
     const Vec3 middle = facet.middle();
     double reach = cone.reach;
@@ -204,7 +194,7 @@ void CurvedShell::leave_joints_whole(const Shell& shell) {
   for (int f = 0; f < static_cast<int>(facets_.size()); ++f)
     for (int k = 0; k < 3; ++k) {
       if (facets_[f].owned.twin[k] == kNotOwned) continue;
-      const int joint = is_on_joint(*this, f, k) ? face_cells_[f].joint[k] : kCorner;
+      const int joint = is_on_joint(*this, f, k) ? face_cells()[f].joint[k] : kCorner;
       const int h = shell.half_edge(3 * f + k);
       for (const int v : {shell.vertex(h), shell.vertex(corner_after(h))}) {
         if (joint_at[v] == kNone) joint_at[v] = joint;

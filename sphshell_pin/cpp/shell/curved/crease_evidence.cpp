@@ -24,18 +24,17 @@ constexpr double kAveraged = 0.1;
 
 // How far a fan's normal is from the nearest mean of those of its elements, and how much it leans
 // from them.
-static std::array<double, 2> off_mean(const Shell& shell, const Fans& fans, int f,
-                                      const Vec3& normal) {
+static std::array<double, 2> off_mean(const Shell& shell, Span fan, const Vec3& normal) {
   Vec3 alike = Vec3::Zero(), by_area = Vec3::Zero(), by_angle = Vec3::Zero();
   double lean = 0, off = std::numeric_limits<double>::infinity();
-  for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-    const Vec3 a = shell.along(*c), b = shell.point(corner_before(*c)) - shell.point(*c);
-    const Vec3& n = shell.topology().face_normal[*c / 3];
+  for (const int c : fan) {
+    const Vec3 a = shell.along(c), b = shell.point(corner_before(c)) - shell.point(c);
+    const Vec3& n = shell.topology().face_normal[c / 3];
     const double area = a.cross(b).norm();
     alike += n, by_area += area * n, by_angle += std::atan2(area, a.dot(b)) * n;
     lean = std::max(lean, (normal - n).norm());
   }
-  for (const Vec3& mean : {alike, by_area, by_angle, max_normal(shell, fans.begin(f), fans.end(f))})
+  for (const Vec3& mean : {alike, by_area, by_angle, max_normal(shell, fan)})
     off = std::min(off, (mean.normalized() - normal).norm());
   return {off, lean};
 }
@@ -45,8 +44,8 @@ std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
                                       const std::vector<Vec3>& normals) {
   std::vector<char> out(normals.size(), 0);
   for (int f = 0; f < fans.size(); ++f) {
-    const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) out[*c] = !(off <= kAveraged * lean);
+    const auto [off, lean] = off_mean(shell, fans[f], normals[*fans[f].first]);
+    for (const int c : fans[f]) out[c] = !(off <= kAveraged * lean);
   }
   return out;
 }
@@ -56,7 +55,7 @@ std::vector<char> independent_normals(const Shell& shell, const Fans& fans,
 bool are_means(const Shell& shell, const Fans& fans, const std::vector<Vec3>& normals) {
   int leaning = 0, means = 0;
   for (int f = 0; f < fans.size(); ++f) {
-    const auto [off, lean] = off_mean(shell, fans, f, normals[*fans.begin(f)]);
+    const auto [off, lean] = off_mean(shell, fans[f], normals[*fans[f].first]);
     if (lean <= kSameNormal) continue;
     ++leaning;
     means += off <= kDigits + kSurelyMean * lean;
@@ -102,8 +101,8 @@ bool CreaseSearch::reaches_beyond(const Fans& fans, int h) const {
   const int o = opposite(h), fan = fans.of(o);
   const Vec3 outward = shell_.along(h).cross(shell_.topology().face_normal[h / 3]);
   const double least = kBeyond * kBeyond * outward.squaredNorm();
-  for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
-    for (int k : {corner_after(*c), corner_before(*c)}) {
+  for (const int c : fans[fan])
+    for (int k : {corner_after(c), corner_before(c)}) {
       const Vec3 d = point(k) - point(o);
       const double away = -d.dot(outward);
       if (away > 0 && away * away >= least * d.squaredNorm()) return true;

@@ -48,6 +48,9 @@ class CreaseSearch {
   int vertex(int corner) const { return shell_.vertex(corner); }
   const Vec3& point(int corner) const { return shell_.point(corner); }
   bool is_known(int corner) const { return faces_.of_triangle(corner / 3) >= 0; }
+  bool has_known(Span corners) const {
+    return std::any_of(corners.first, corners.last, [&](int c) { return is_known(c); });
+  }
   // Whether the faces at both sides of a joint are known.
   bool is_settled(std::size_t e) const {
     return is_known(joints_[e].half_edge[0]) && is_known(joints_[e].half_edge[1]);

@@ -110,12 +110,10 @@ void CreaseSearch::divide_normals() {
     for (int f = 0; f < fans.size(); ++f) beside[f] = beside[f] && joints[f] < fans.count(f);
   }
   for (int f = 0; f < fans.size(); ++f) {
-    if (!(divided_[*fans.begin(f)] || beside[f]) ||
-        std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
-      continue;
-    const Vec3 normal = max_normal(shell_, fans.begin(f), fans.end(f));
+    if (!(divided_[*fans[f].first] || beside[f]) || has_known(fans[f])) continue;
+    const Vec3 normal = max_normal(shell_, fans[f]);
     if (divided_normals_.empty()) divided_normals_ = original_;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) divided_normals_[*c] = normal;
+    for (const int c : fans[f]) divided_normals_[c] = normal;
   }
 }
 
@@ -226,21 +224,19 @@ void CreaseSearch::separate_straight_walls() {
 void CreaseSearch::lean_as_other_ends(const Fans& fans) {
   std::vector<std::pair<int, Vec3>> found;  // first all, as they are estimated from each other
   for (int f = 0; f < fans.size(); ++f) {
-    if (!divided_[*fans.begin(f)] ||
-        std::any_of(fans.begin(f), fans.end(f), [&](int c) { return is_known(c); }))
-      continue;
+    if (!divided_[*fans[f].first] || has_known(fans[f])) continue;
     constexpr double kTrust = 0.01;  // in the fan's own elements
-    const Vec3& own = normals()[*fans.begin(f)];
+    const Vec3& own = normals()[*fans[f].first];
     // Least squares: perpendicular to what the sides' tangents would be, each mirrored from its
     // other end, and near the own normal.
     Eigen::Matrix3d square = kTrust * Eigen::Matrix3d::Identity();
     Vec3 along = kTrust * own;
     double before = 0;
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) {
-      before = std::max(before, (original_[*c] - own).norm());
-      for (int w : {corner_after(*c), corner_before(*c)}) {
+    for (const int c : fans[f]) {
+      before = std::max(before, (original_[c] - own).norm());
+      for (int w : {corner_after(c), corner_before(c)}) {
         if (divided_[w]) continue;
-        const Vec3 d = (point(w) - point(*c)).normalized();
+        const Vec3 d = (point(w) - point(c)).normalized();
         square += d * d.transpose();
         along -= d * normals()[w].dot(d);
       }
@@ -250,7 +246,7 @@ void CreaseSearch::lean_as_other_ends(const Fans& fans) {
     if ((normal - own).norm() <= 1.5 * before) found.push_back({f, normal});
   }
   for (const auto& [f, normal] : found)
-    for (const int* c = fans.begin(f); c != fans.end(f); ++c) divided_normals_[*c] = normal;
+    for (const int c : fans[f]) divided_normals_[c] = normal;
 }
 
 // Classification depends on the estimates, which change as fans are divided: repeated until nothing

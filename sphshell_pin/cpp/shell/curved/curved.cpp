@@ -20,22 +20,6 @@ static double tolerance_of(const Shell& shell, const CurveOptions& options) {
   return std::max(kSinglePrecision * shell.size(), kOfRounding * options.rounding);
 }
 
-// A corner compares its normal with the last one of its vertex: corners of a fan mostly come one
-// after another.
-SharedNormals::SharedNormals(const Shell& shell, const std::vector<Vec3>& normals)
-    : which_(normals.size()) {
-  distinct_.reserve(shell.vertices().size());
-  LargeArray<int> latest(shell.vertices().size(), -1);
-  for (std::size_t c = 0; c < normals.size(); ++c) {
-    int& last = latest[shell.vertex(static_cast<int>(c))];
-    if (last < 0 || distinct_[last] != normals[c]) {
-      last = static_cast<int>(distinct_.size());
-      distinct_.push_back(normals[c]);
-    }
-    which_[c] = last;
-  }
-}
-
 std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions options) {
   const double tolerance = tolerance_of(*shell, options);
   std::shared_ptr<Shell> out = shell;
@@ -67,7 +51,7 @@ std::shared_ptr<Shell> curve(const std::shared_ptr<Shell>& shell, CurveOptions o
 
 CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
   const bool given = !options.normals.empty();
-  std::vector<Vec3> normals = std::move(options.normals);
+  normals_ = std::move(options.normals);
   std::vector<Trust> trust;
   std::shared_ptr<const CoplanarRegions> regions = options.regions;
   exact_ = given;
@@ -79,34 +63,28 @@ CurvedShell::CurvedShell(const Shell& shell, CurveOptions options) {
     // Normals that were given are kept but where faces are known; else they are estimated. Then
     // fans are divided at the creases that the elements show.
     EstimatedNormals settled = given && !options.estimate
-                                   ? settle_given_normals(shell, normals, faces_)
+                                   ? settle_given_normals(shell, normals_, faces_)
                                    : estimate_normals(shell, *regions, faces_);
     trust = std::move(settled.trust);
     CornerNormals found =
         divide_at_creases(shell, std::move(settled.normals), settled.given, faces_);
     divided_ = std::move(found.set_aside);
     creases_ = found.creases;
-    for (std::size_t c = 0; c < normals.size(); ++c)
-      divided_[c] = divided_[c] || (normals[c] - found.normals[c]).norm() > kSameNormal;
-    normals = std::move(found.normals);
+    for (std::size_t c = 0; c < normals_.size(); ++c)
+      divided_[c] = divided_[c] || (normals_[c] - found.normals[c]).norm() > kSameNormal;
+    normals_ = std::move(found.normals);
   }
-  normals_ = SharedNormals(shell, normals);
-  // A large part of what building takes at its highest.
-  std::vector<Vec3>().swap(normals);
   give_back_freed_memory(shell.triangles().size());
   // Sides first, as neighbors share them; then the middles, which each element has for itself.
   bend_edges(shell, options.straight, regions.get(), trust);
   std::vector<Trust>().swap(trust);
   raise_centers(shell);
-  normals_ = {};
-  FaceCells cells = make_face_cells(shell, faces_, facets_);
-  face_cells_ = std::move(cells.of);
-  intruders_ = std::move(cells.intruders);
-  inexact_ = std::move(cells.inexact);
-  if (!face_cells_.empty()) gap_ = kMostGap * shell.size();
+  std::vector<Vec3>().swap(normals_);
+  face_cells_ = make_face_cells(shell, faces_, facets_);
+  if (!face_cells().empty()) gap_ = kMostGap * shell.size();
   build_cones(shell);
   bound_cells(shell);
-  if (!face_cells_.empty()) face_search_ = std::make_unique<FaceSearch>(shell, *this);
+  if (!face_cells().empty()) face_search_ = std::make_unique<FaceSearch>(shell, *this);
 }
 
 // Why an element is flat: its normals were set aside at a crease, or do not lean.
@@ -138,8 +116,8 @@ std::vector<double> CurvedShell::chord_errors(const Shell& shell) const {
     out.push_back(witness.of(t));
     for (int k = 0; k < 3; ++k) {
       const Edge& edge = topology.edge_at(3 * t + k);
-      for (int i = edge.begin; i < edge.begin + edge.count; ++i)
-        out.back() = std::max(out.back(), witness.of(triangle_of(topology.incidence[i])));
+      for (const int h : topology.around(edge))
+        out.back() = std::max(out.back(), witness.of(triangle_of(h)));
     }
   }
   return out;

@@ -97,18 +97,6 @@ enum class Bending : int {
   Crease = 2,  // the elements around contradict the bend of its normals
 };
 
-// Normals at triangle corners (3 triangle + k). Most corners of a vertex share one.
-class SharedNormals {
- public:
-  SharedNormals() = default;
-  SharedNormals(const Shell& shell, const std::vector<Vec3>& normals);
-  const Vec3& operator[](int corner) const { return distinct_[which_[corner]]; }
-
- private:
-  LargeArray<Vec3> distinct_;
-  LargeArray<int> which_;
-};
-
 enum class Trust : char;
 
 // Makes the curved elements of the shell, and returns it. Where faces are recognized that vertices
@@ -132,12 +120,12 @@ class CurvedShell {
   // The faces that elements lie on: those of CAD, or recognized.
   const Faces& faces() const { return faces_; }
   // Per facet what it is of its face; empty where there are no faces.
-  const LargeArray<FaceCell>& face_cells() const { return face_cells_; }
+  const LargeArray<FaceCell>& face_cells() const { return face_cells_.of; }
   // Of spheres' queries; null where there are none.
   const FaceSearch* face_search() const { return face_search_.get(); }
   // FaceCells::intruders, and why faces do not give closest points.
-  const std::vector<std::pair<int, int>>& intruders() const { return intruders_; }
-  const std::vector<Inexact>& inexact() const { return inexact_; }
+  const std::vector<std::pair<int, int>>& intruders() const { return face_cells_.intruders; }
+  const std::vector<Inexact>& inexact() const { return face_cells_.inexact; }
   // What the shell can lie on, found at first use.
   const Flats& flats(const Shell& shell) const {
     std::call_once(flats_found_, [&] { flats_ = find_flats(shell); });
@@ -147,8 +135,8 @@ class CurvedShell {
   double gap() const { return gap_; }
   // That which gives the closest points of a facet; null: the facet's own cubic does.
   const Primitive* face_of(int facet) const {
-    if (face_cells_.empty() || !face_cells_[facet].closed) return nullptr;
-    return &faces_.shapes[face_cells_[facet].face];
+    if (face_cells_.of.empty() || !face_cells_.of[facet].closed) return nullptr;
+    return &faces_.shapes[face_cells_.of[facet].face];
   }
   // Whether the normals are the surface's own, and not estimated.
   bool exact() const { return exact_; }
@@ -159,12 +147,6 @@ class CurvedShell {
   // Per triangle the largest sagitta [m] that the turns between it and its neighbors, or between
   // those and theirs, account for: what the flat elements are off the surface there, about.
   std::vector<double> chord_errors(const Shell& shell) const;
-  std::size_t bytes() const {
-    return facets_.size() * (sizeof(CurvedFacet) + sizeof(NormalCone) + sizeof(CellBounds)) +
-           tangents_.spoke_.size() * sizeof(int) + divided_.size() +
-           faces_.of.size() * sizeof(int) + face_cells_.size() * sizeof(FaceCell) +
-           (face_search_ ? face_search_->bytes() : 0);
-  }
 
  private:
   void bend_edges(const Shell& shell, const std::vector<std::uint8_t>& straight,
@@ -177,12 +159,10 @@ class CurvedShell {
   void bound_cells(const Shell& shell);
 
   Faces faces_;
-  LargeArray<FaceCell> face_cells_;
+  FaceCells face_cells_;
   std::unique_ptr<const FaceSearch> face_search_;
-  std::vector<std::pair<int, int>> intruders_;
-  std::vector<Inexact> inexact_;
   double gap_ = 0;
-  SharedNormals normals_;  // let go when the elements are bent
+  std::vector<Vec3> normals_;  // per triangle corner; let go when the elements are bent
   std::vector<char> divided_;
   int creases_ = 0;
   LargeArray<CurvedFacet> facets_;

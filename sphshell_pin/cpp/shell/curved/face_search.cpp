@@ -203,13 +203,6 @@ BoxTree::Found BoxTree::find(const Vec3& center, double radius, std::vector<int>
   return {room.data() + first, room.data() + last};
 }
 
-std::size_t FaceSearch::bytes() const {
-  std::size_t all = things.bytes() + facets.bytes();
-  for (const auto* regions : {&of_face, &of_joint})
-    for (const Region& one : *regions) all += sizeof(Region) + one.parts.bytes();
-  return all;
-}
-
 Region::Region(const Boxes& boxes) : parts(boxes) {
   for (const auto& [part, thing] : boxes) box.extend(part);
 }

@@ -14,13 +14,8 @@ class BoxTree {
   using Boxes = std::vector<std::pair<Eigen::AlignedBox3d, int>>;
   explicit BoxTree(Boxes boxes);
 
-  std::size_t bytes() const { return nodes_.size() * sizeof(Node); }
   // Those whose box meets a ball, in the order of the tree; in `room`, which grows where it must.
-  struct Found {
-    const int *first, *last;
-    const int* begin() const { return first; }
-    const int* end() const { return last; }
-  };
+  using Found = Span;
   Found find(const Vec3& center, double radius, std::vector<int>& room) const;
 
  private:
@@ -60,8 +55,6 @@ struct FaceSearch {
   BoxTree things;
   BoxTree facets;    // with an element, or another side
   double bulge = 0;  // the largest of facets [m]
-
-  std::size_t bytes() const;
 };
 
 // Whether a side is part of a joint that is a line or a circle.

@@ -35,28 +35,30 @@ class Fans {
   int size() const { return static_cast<int>(begin_.size()) - 1; }
   int of(int corner) const { return fan_of_[corner]; }
   int count(int fan) const { return begin_[fan + 1] - begin_[fan]; }
-  const int* begin(int fan) const { return members_.data() + begin_[fan]; }
-  const int* end(int fan) const { return members_.data() + begin_[fan + 1]; }
+  // Its corners, ascending.
+  Span operator[](int fan) const {
+    return {members_.data() + begin_[fan], members_.data() + begin_[fan + 1]};
+  }
 
   // The vertices two edges or less from the fan's own, through triangles that smooth edges join
   // and not past a sharp vertex.
   void vertices_around(int fan, const std::vector<char>& sharp, std::vector<int>& out) const {
-    const int own = shell_.vertex(*begin(fan));
+    const int own = shell_.vertex(*(*this)[fan].first);
     const auto sort = [&out](std::size_t from) {
       std::sort(out.begin() + from, out.end());
       out.erase(std::unique(out.begin() + from, out.end()), out.end());
     };
     out.clear();
-    for (const int* c = begin(fan); c != end(fan); ++c)
-      for (int k = 0; k < 3; ++k) out.push_back(fan_of_[*c / 3 * 3 + k]);
+    for (const int c : (*this)[fan])
+      for (int k = 0; k < 3; ++k) out.push_back(fan_of_[c / 3 * 3 + k]);
     sort(0);
     // The fans, and behind them the vertices around each, of which most are found several times.
     // The fans' own vertices are around `fan`, which is not sharp.
     const std::size_t fans = out.size();
     for (std::size_t i = 0; i < fans; ++i) {
       if (sharp[out[i]]) continue;
-      for (const int *d = begin(out[i]), *last = end(out[i]); d != last; ++d)
-        for (const int other : {corner_after(*d), corner_before(*d)}) {
+      for (const int d : (*this)[out[i]])
+        for (const int other : {corner_after(d), corner_before(d)}) {
           const int v = shell_.vertex(other);
           if (v != own && (out.size() > fans + kFew ||
                            std::find(out.begin() + fans, out.end(), v) == out.end()))
@@ -78,6 +80,6 @@ class Fans {
 // What a facet counts for at its corner, and the normal of a fan, exact where the vertices lie on a
 // sphere (Max, J. Graphics Tools 4 (1999) 1).
 double max_weight(const Shell& shell, int corner);
-Vec3 max_normal(const Shell& shell, const int* begin, const int* end);
+Vec3 max_normal(const Shell& shell, Span corners);
 
 }  // namespace sphshell

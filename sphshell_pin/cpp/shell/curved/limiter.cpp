@@ -25,9 +25,9 @@ Dominance::Dominance(const Shell& shell, const CoplanarRegions& regions)
   }
 }
 
-bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& ratio) const {
+bool Dominance::normal(Span fan, Vec3& normal, double& ratio) const {
   const Topology& topology = shell_.topology();
-  if (std::none_of(begin, end, [&](int c) {
+  if (std::none_of(fan.first, fan.last, [&](int c) {
         return uneven_[topology.edge_of[c]] || uneven_[topology.edge_of[corner_before(c)]];
       }))
     return false;
@@ -51,12 +51,12 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
   };
   bool any = false;
   ratio = 0;
-  for (const int* c = begin; c != end; ++c)
-    for (const int h : {*c, corner_before(*c)}) {
+  for (const int c : fan)
+    for (const int h : {c, corner_before(c)}) {
       const int g = topology.other_half_edge(h);
       if (g < 0) continue;
       const int here = regions_.of(triangle_of(h)), there = regions_.of(triangle_of(g));
-      if (here == there || std::none_of(begin, end, [&](int d) { return d / 3 == g / 3; }))
+      if (here == there || std::none_of(fan.first, fan.last, [&](int d) { return d / 3 == g / 3; }))
         continue;
       const double up = regions_.height(h), down = regions_.height(g);
       ratio = std::max(ratio, up / down);
@@ -81,11 +81,11 @@ bool Dominance::normal(const int* begin, const int* end, Vec3& normal, double& r
     if (m.under == 0) highest = std::max(highest, m.height);
   if (!(highest > 0)) return false;
   Vec3 sum = Vec3::Zero();
-  for (const int* c = begin; c != end; ++c) {
-    const Member& m = member(regions_.of(*c / 3));
+  for (const int c : fan) {
+    const Member& m = member(regions_.of(c / 3));
     // The mean over the highest regions, weighted as any vertex normal.
     if (m.under == 0 && kMuchHigher * m.height >= highest)
-      sum += max_weight(shell_, *c) * regions_.normal(m.region);
+      sum += max_weight(shell_, c) * regions_.normal(m.region);
   }
   if (sum.isZero(0)) return false;
   normal = sum.normalized();
@@ -128,10 +128,10 @@ void SagittaWitness::find_usual() {
 // larger one.
 double SagittaWitness::most(const Shell& shell, const Edge& edge, bool smooth, bool fitted) const {
   double least = std::numeric_limits<double>::infinity(), lowest = least, most = 0;
-  for (int i = edge.begin; i < edge.begin + edge.count; ++i) {
-    const double s = sagitta_[regions_.of(triangle_of(shell.topology().incidence[i]))];
+  for (const int h : shell.topology().around(edge)) {
+    const double s = sagitta_[regions_.of(triangle_of(h))];
     least = std::min(least, s), most = std::max(most, s);
-    lowest = std::min(lowest, regions_.height(shell.topology().incidence[i]));
+    lowest = std::min(lowest, regions_.height(h));
   }
   const double local = kMostSagittas * (smooth ? least : most);
   const double length = shell.along(shell.topology().incidence[edge.begin]).norm();

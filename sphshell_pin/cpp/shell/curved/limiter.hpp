@@ -18,7 +18,7 @@ class Dominance {
  public:
   Dominance(const Shell& shell, const CoplanarRegions& regions);
   // False where no facet of the fan is much higher than another; else by how much one is.
-  bool normal(const int* begin, const int* end, Vec3& normal, double& ratio) const;
+  bool normal(Span fan, Vec3& normal, double& ratio) const;
 
  private:
   const Shell& shell_;

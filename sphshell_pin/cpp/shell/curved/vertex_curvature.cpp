@@ -20,35 +20,21 @@ constexpr double kMostTilted = 0.2;
 using Row = VertexCurvature::Terms;
 using Square = Eigen::Matrix<double, kTerms, kTerms>;
 
-// The terms at a point, and their derivatives.
-class Powers {
- public:
-  explicit Powers(const double (&x)[3]) {
-    for (int i = 0; i < 3; ++i) {
-      power_[i][0] = 1;
-      for (int n = 1; n < 5; ++n) power_[i][n] = power_[i][n - 1] * x[i];
-    }
+// The terms at a point, or their derivatives by one of its coordinates.
+Row terms_at(const double (&x)[3], int by = -1) {
+  double power[3][5];
+  for (int k = 0; k < 3; ++k) {
+    power[k][0] = 1;
+    for (int n = 1; n < 5; ++n) power[k][n] = power[k][n - 1] * x[k];
   }
-  // Of term i; `by` the coordinate to differentiate by, or -1.
-  double term(int i, int by) const {
-    // A product of powers, of which one is differentiated.
-    const int (&m)[3] = kPowers[i];
-    double value = 1;
+  Row out = Row::Ones();
+  for (int i = 0; i < kTerms; ++i)
     for (int k = 0; k < 3; ++k) {
-      if (k == by && m[k] == 0) return 0;
-      value *= k == by ? m[k] * power_[k][m[k] - 1] : power_[k][m[k]];
+      const int n = kPowers[i][k];
+      out[i] *= k != by ? power[k][n] : n == 0 ? 0 : n * power[k][n - 1];
     }
-    return value;
-  }
-  Row terms(int by = -1) const {
-    Row out;
-    for (int i = 0; i < kTerms; ++i) out[i] = term(i, by);
-    return out;
-  }
-
- private:
-  double power_[3][5];
-};
+  return out;
+}
 
 }  // namespace
 
@@ -79,12 +65,11 @@ double VertexCurvature::beyond(const Vec3& point, const Vec3& direction) const {
   for (int i = 0; i < 3; ++i) {
     const Vec3 d = point + way * direction - origin;
     const double x[3] = {east.dot(d) / scale[0], north.dot(d) / scale[1], normal.dot(d) / scale[2]};
-    const Powers powers(x);
-    const Vec3 slope(-terms.dot(powers.terms(0)), -terms.dot(powers.terms(1)),
-                     1 - terms.dot(powers.terms(2)));
+    const Vec3 slope(-terms.dot(terms_at(x, 0)), -terms.dot(terms_at(x, 1)),
+                     1 - terms.dot(terms_at(x, 2)));
     const double rise = slope.dot(along);
     if (rise == 0) return way;
-    way -= (x[2] - terms.dot(powers.terms())) / rise;
+    way -= (x[2] - terms.dot(terms_at(x))) / rise;
   }
   return way;
 }
@@ -119,19 +104,18 @@ VertexCurvature fit_curvature(const Vec3& origin, const Vec3& normal,
   for (const OrientedPoint& p : around) {
     const Vec3 d = p.point - origin;
     const double x[3] = {out.east.dot(d) / sx, out.north.dot(d) / sy, normal.dot(d) / sz};
-    const Powers powers(x);
     const double apart2 = x[0] * x[0] + x[1] * x[1];
     if (!(apart2 > 0)) continue;
     // Heights over a quadric grow with the square of the distance: with this weight far points
     // count no more than near ones.
-    add(powers.terms(), x[2], 1 / (apart2 * apart2));
+    add(terms_at(x), x[2], 1 / (apart2 * apart2));
     const double up = normal.dot(p.normal);
     if (!exact || up < kMostTilted) continue;
     const double slope[2] = {-out.east.dot(p.normal) / up * sx / sz,
                              -out.north.dot(p.normal) / up * sy / sz};
     for (int k = 0; k < 2; ++k)
       // By implicit differentiation the slope of z is (terms_x) / (1 - terms_z).
-      add(powers.terms(k) + slope[k] * powers.terms(2), slope[k], 1 / apart2);
+      add(terms_at(x, k) + slope[k] * terms_at(x, 2), slope[k], 1 / apart2);
   }
   square = square.selfadjointView<Eigen::Lower>();
   square.diagonal().array() += kUndetermined * square.diagonal().maxCoeff();

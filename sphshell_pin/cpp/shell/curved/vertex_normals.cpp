@@ -34,12 +34,12 @@ constexpr double kTakesOver = 0.44;
 // True where the surface falls away from a fan's vertex along straight lines, as from the tip of a
 // cone: seen from the vertices around it does not bend that much. normal_at(corner).
 template <class NormalAt>
-bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, const int* begin, const int* end) {
+bool is_cone_apex(const Shell& shell, NormalAt&& normal_at, Span fan) {
   double uneven = 0, bent = 0;
-  for (const int* c = begin; c != end; ++c) {
-    for (const int far : {corner_after(*c), corner_before(*c)}) {
-      const Vec3 edge = shell.point(far) - shell.point(*c);
-      const double here = -normal_at(*c).dot(edge), there = normal_at(far).dot(edge);
+  for (const int c : fan) {
+    for (const int far : {corner_after(c), corner_before(c)}) {
+      const Vec3 edge = shell.point(far) - shell.point(c);
+      const double here = -normal_at(c).dot(edge), there = normal_at(far).dot(edge);
       // On a circular arc a chord leaves both tangent planes by the same angle; on a cone's ruling
       // that of the far end is zero.
       uneven += std::abs(here - there) / edge.norm();
@@ -162,10 +162,9 @@ double max_weight(const Shell& shell, int corner) {
   return a.cross(b).norm() / (a.squaredNorm() * b.squaredNorm());
 }
 
-Vec3 max_normal(const Shell& shell, const int* begin, const int* end) {
+Vec3 max_normal(const Shell& shell, Span corners) {
   Vec3 sum = Vec3::Zero();
-  for (const int* c = begin; c != end; ++c)
-    sum += max_weight(shell, *c) * shell.topology().face_normal[*c / 3];
+  for (const int c : corners) sum += max_weight(shell, c) * shell.topology().face_normal[c / 3];
   return sum.normalized();
 }
 
@@ -190,35 +189,35 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   });
   const int count = fans.size();
   const auto set = [&](int fan, const Vec3& normal, Trust how) {
-    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c)
-      if (!known(*c)) out[*c] = normal, trust[*c] = how;
+    for (const int c : fans[fan])
+      if (!known(c)) out[c] = normal, trust[c] = how;
   };
   // Largest angle [rad] from a fan's normal to those of its triangles and of the fans beside it.
   const auto spread = [&](int fan, bool beside) {
     double cosine = 1;
-    for (const int* c = fans.begin(fan); c != fans.end(fan); ++c) {
-      cosine = std::min(cosine, out[*c].dot(topology.face_normal[*c / 3]));
+    for (const int c : fans[fan]) {
+      cosine = std::min(cosine, out[c].dot(topology.face_normal[c / 3]));
       for (int k = 0; beside && k < 3; ++k)
-        cosine = std::min(cosine, out[*c].dot(out[*c / 3 * 3 + k]));
+        cosine = std::min(cosine, out[c].dot(out[c / 3 * 3 + k]));
     }
     return std::acos(std::clamp(cosine, -1.0, 1.0));
   };
-  const auto mean = [&](int fan) { return max_normal(shell, fans.begin(fan), fans.end(fan)); };
+  const auto mean = [&](int fan) { return max_normal(shell, fans[fan]); };
   for (int fan = 0; fan < count; ++fan) set(fan, mean(fan), Trust::Averaged);
-  std::vector<int> around;
-  std::vector<Vec3> points;
   const std::vector<char> none(fans.size(), 0);
-  const auto gather = [&](int fan, const std::vector<char>& sharp, std::vector<int>& vertices,
-                          std::vector<Vec3>& at) {
+  const auto points_around = [&](int fan, const std::vector<char>& sharp) -> const auto& {
+    thread_local std::vector<int> vertices;
+    thread_local std::vector<Vec3> points;
     fans.vertices_around(fan, sharp, vertices);
-    at.clear();
-    for (int v : vertices) at.push_back(shell.vertices()[v]);
-    return shell.point(*fans.begin(fan));
+    points.clear();
+    for (int v : vertices) points.push_back(shell.vertices()[v]);
+    return points;
   };
   // Whether both fits leave next to nothing and agree: an uneven sampling of a smooth surface.
   const auto fits_surely = [&](int fan) {
-    const Vec3 origin = gather(fan, none, around, points);
-    Vec3 quadratic = out[*fans.begin(fan)], cubic = quadratic;
+    const Vec3& origin = shell.point(*fans[fan].first);
+    const std::vector<Vec3>& points = points_around(fan, none);
+    Vec3 quadratic = out[*fans[fan].first], cubic = quadratic;
     double doubt;
     return fit_normal<5>(origin, points, quadratic, doubt, kLittle) &&
            fit_normal<9>(origin, points, cubic, doubt, kLittle) &&
@@ -227,19 +226,19 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   // Takes the normals of the faces in a fan over: the one that a facet has too, else their mean.
   const auto take_over = [&](int fan) {
     Vec3 sum = Vec3::Zero();
-    const int *begin = fans.begin(fan), *end = fans.end(fan);
-    for (const int* c = begin; c != end; ++c)
-      if (known(*c)) sum += out[*c];
+    const Span all = fans[fan];
+    for (const int c : all)
+      if (known(c)) sum += out[c];
     if (sum.isZero(0)) return false;
     sum.normalize();
-    for (const int* c = begin; c != end; ++c) {
-      if (known(*c)) continue;
-      const Vec3& own = topology.face_normal[*c / 3];
-      const bool alike = std::any_of(begin, end, [&](int d) {
+    for (const int c : all) {
+      if (known(c)) continue;
+      const Vec3& own = topology.face_normal[c / 3];
+      const bool alike = std::any_of(all.first, all.last, [&](int d) {
         return known(d) && (out[d] - own).squaredNorm() < kSameNormal * kSameNormal;
       });
-      out[*c] = !alike && sum.dot(own) > std::cos(kTakesOver) ? sum : own;
-      trust[*c] = Trust::Limited;
+      out[c] = !alike && sum.dot(own) > std::cos(kTakesOver) ? sum : own;
+      trust[c] = Trust::Limited;
     }
     return true;
   };
@@ -249,32 +248,32 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
   std::vector<char> settled(none), sharp(none);
   const auto plain = [&](int c) { return known(c) ? out[c] : mean(fans.of(c)); };
   for (int fan = 0; fan < count; ++fan) {
-    const int *begin = fans.begin(fan), *end = fans.end(fan);
+    const Span all = fans[fan];
     if (take_over(fan)) {
       settled[fan] = sharp[fan] = 1;
       continue;
     }
     const double angle = spread(fan, false), limit = shell.crease_angle();
     // The normal leans over the crease angle from one of its triangles.
-    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, plain, begin, end));
-    settled[fan] = sharp[fan] || std::all_of(begin, end, [&](int c) {
-                     return topology.planar_face[c / 3] == topology.planar_face[*begin / 3];
+    sharp[fan] = angle > limit || (angle > limit / 2 && is_cone_apex(shell, plain, all));
+    settled[fan] = sharp[fan] || std::all_of(all.first, all.last, [&](int c) {
+                     return topology.planar_face[c / 3] == topology.planar_face[*all.first / 3];
                    });
     Vec3 normal;
     double ratio;
     if (settled[fan]) {
-      for (const int* c = begin; c != end; ++c)
-        out[*c] = topology.face_normal[*c / 3], trust[*c] = Trust::Facet;
-    } else if (dominance.normal(begin, end, normal, ratio) &&
+      for (const int c : all) out[c] = topology.face_normal[c / 3], trust[c] = Trust::Facet;
+    } else if (dominance.normal(all, normal, ratio) &&
                (ratio > kMostUnevenHeights || !fits_surely(fan))) {
       set(fan, normal, Trust::Limited);
       settled[fan] = sharp[fan] = 1;
     }
   }
   LargeArray<Vec3> fitted(fans.size());  // zero where none is trusted; taken when all are done
-  const auto fit = [&](int fan, std::vector<int>& near, std::vector<Vec3>& at) {
-    const Vec3 origin = gather(fan, sharp, near, at);
-    const Vec3 own = out[*fans.begin(fan)];
+  const auto fit = [&](int fan) {
+    const Vec3& origin = shell.point(*fans[fan].first);
+    const std::vector<Vec3>& at = points_around(fan, sharp);
+    const Vec3 own = out[*fans[fan].first];
     Vec3 quadratic = own, cubic = own;
     // Two models of different order: where both fit and agree the points determine the normal.
     double doubt;
@@ -286,7 +285,7 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
     };
     // Two fits that agree are right. One alone has to stay close to the triangles; seen from one
     // side only, a normal may lie somewhat beyond them.
-    const bool open = topology.vertex_sharp[shell.vertex(*fans.begin(fan))];
+    const bool open = topology.vertex_sharp[shell.vertex(*fans[fan].first)];
     if (fits && fits_better ? agree(quadratic, cubic, kLikely * wide)
                             : fits_better && agree(cubic, own, kLikely * spread(fan, false)))
       fitted[fan] = cubic;
@@ -294,15 +293,10 @@ EstimatedNormals estimate_normals(const Shell& shell, const CoplanarRegions& reg
              agree(quadratic, own, open ? 1.1 * wide : kLikely * spread(fan, false)))
       fitted[fan] = quadratic;
   };
-  in_parallel(static_cast<std::size_t>(count), kAllCores, kGrain,
-              [&](std::size_t begin, std::size_t end) {
-                std::vector<int> near;
-                std::vector<Vec3> at;
-                for (std::size_t fan = begin; fan < end; ++fan) {
-                  fitted[fan].setZero();
-                  if (!settled[fan]) fit(static_cast<int>(fan), near, at);
-                }
-              });
+  for_each_in_parallel(static_cast<std::size_t>(count), [&](std::size_t fan) {
+    fitted[fan].setZero();
+    if (!settled[fan]) fit(static_cast<int>(fan));
+  });
   for (int fan = 0; fan < count; ++fan)
     if (!fitted[fan].isZero(0)) set(fan, fitted[fan], Trust::Fitted);
   return {std::move(out), std::move(trust), false};

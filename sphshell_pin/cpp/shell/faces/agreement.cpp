@@ -51,85 +51,78 @@ struct Contacts {
   std::vector<Vec3> points;
 };
 
-// Gauss-Newton on the distances of vertices from their faces, and on their differences.
-class Agreement {
- public:
-  Agreement(std::vector<Primitive>& shapes, const std::vector<std::vector<Vec3>>& points)
-      : shapes_(shapes), points_(points) {}
+// The largest; infinite where any is not finite.
+double disagreement(const std::vector<Primitive>& shapes,
+                    const std::vector<const Contacts*>& contacts) {
+  double most = 0;
+  for (const Contacts* one : contacts)
+    for (const Vec3& x : one->points)
+      most = std::max(
+          most, std::abs(shapes[one->b].distance(x) - one->sign * shapes[one->a].distance(x)));
+  return std::isfinite(most) ? most : std::numeric_limits<double>::infinity();
+}
 
-  // Round faces of one chain, and all contacts of any of them.
-  void settle(const std::vector<int>& faces, const std::vector<const Contacts*>& contacts,
-              double size, double tolerance) {
-    const std::vector<Primitive> before = shapes_;
-    std::map<int, int> at;
-    std::vector<Vec3> centers;
-    for (const int f : faces) {
-      at[f] = 8 * static_cast<int>(at.size());
-      centers.push_back(points_[f].front());
-    }
-    const auto unknowns = Eigen::Index(8 * faces.size());
-    double worst = disagreement(contacts), first = worst;
-    for (int round = 0; round < kMostJointFits; ++round) {
-      Eigen::MatrixXd square = Eigen::MatrixXd::Zero(unknowns, unknowns);
-      Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
-      const auto row_at = [&](int f, const Vec3& x, double& off) {
-        Vec3 n;
-        off = shapes_[f].distance(x, n);
-        return row_of(shapes_[f], centers[at[f] / 8], size, x, n);
-      };
-      double off = 0, other = 0;
-      for (const int f : faces)
-        for (const Vec3& x : points_[f]) {
-          const Slopes row = row_at(f, x, off);
-          square.block<8, 8>(at[f], at[f]) += row * row.transpose();
-          right.segment<8>(at[f]) -= off * row;
-        }
-      for (const Contacts* one : contacts)
-        for (const Vec3& x : one->points) {
-          // The first may be a plane, which stays.
-          const Slopes row = row_at(one->b, x, off);
-          const bool plane = shapes_[one->a].kind == FaceKind::Plane;
-          const Slopes back =
-              plane ? Slopes(Slopes::Zero()) : Slopes(one->sign * row_at(one->a, x, other));
-          if (plane) other = shapes_[one->a].distance(x);
-          const double apart = off - one->sign * other;
-          const int i = at[one->b], j = plane ? i : at[one->a];
-          square.block<8, 8>(i, i) += kAgreement * row * row.transpose();
-          right.segment<8>(i) -= kAgreement * apart * row;
-          if (plane) continue;
-          square.block<8, 8>(j, j) += kAgreement * back * back.transpose();
-          square.block<8, 8>(i, j) -= kAgreement * row * back.transpose();
-          square.block<8, 8>(j, i) -= kAgreement * back * row.transpose();
-          right.segment<8>(j) += kAgreement * apart * back;
-        }
-      square.diagonal().array() += kDamping * square.diagonal().maxCoeff() / kAgreement;
-      const Eigen::VectorXd step = square.ldlt().solve(right);
-      if (!step.allFinite()) break;
-      for (const int f : faces) move(shapes_[f], centers[at[f] / 8], size, step.segment<8>(at[f]));
-      worst = disagreement(contacts);
-    }
-    // Kept if they agree better and still go through their vertices.
-    bool kept = worst < first;
+// Gauss-Newton on the distances of vertices from their faces, and on their differences: of round
+// faces of one chain, and all contacts of any of them.
+void settle(const std::vector<int>& faces, const std::vector<const Contacts*>& contacts,
+            const std::vector<std::vector<Vec3>>& points, double size, double tolerance,
+            std::vector<Primitive>& shapes) {
+  const std::vector<Primitive> before = shapes;
+  std::map<int, int> at;
+  std::vector<Vec3> centers;
+  for (const int f : faces) {
+    at[f] = 8 * static_cast<int>(at.size());
+    centers.push_back(points[f].front());
+  }
+  const auto unknowns = Eigen::Index(8 * faces.size());
+  double worst = disagreement(shapes, contacts), first = worst;
+  for (int round = 0; round < kMostJointFits; ++round) {
+    Eigen::MatrixXd square = Eigen::MatrixXd::Zero(unknowns, unknowns);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
+    const auto row_at = [&](int f, const Vec3& x, double& off) {
+      Vec3 n;
+      off = shapes[f].distance(x, n);
+      return row_of(shapes[f], centers[at[f] / 8], size, x, n);
+    };
+    double off = 0, other = 0;
     for (const int f : faces)
-      for (const Vec3& x : points_[f])
-        kept = kept && std::abs(shapes_[f].distance(x)) <=
-                           std::max(tolerance, 2 * std::abs(before[f].distance(x)));
-    if (!kept) shapes_ = before;
-  }
-
- private:
-  double disagreement(const std::vector<const Contacts*>& contacts) const {
-    double most = 0;
+      for (const Vec3& x : points[f]) {
+        const Slopes row = row_at(f, x, off);
+        square.block<8, 8>(at[f], at[f]) += row * row.transpose();
+        right.segment<8>(at[f]) -= off * row;
+      }
     for (const Contacts* one : contacts)
-      for (const Vec3& x : one->points)
-        most = std::max(
-            most, std::abs(shapes_[one->b].distance(x) - one->sign * shapes_[one->a].distance(x)));
-    return std::isfinite(most) ? most : std::numeric_limits<double>::infinity();
+      for (const Vec3& x : one->points) {
+        // The first may be a plane, which stays.
+        const Slopes row = row_at(one->b, x, off);
+        const bool plane = shapes[one->a].kind == FaceKind::Plane;
+        const Slopes back =
+            plane ? Slopes(Slopes::Zero()) : Slopes(one->sign * row_at(one->a, x, other));
+        if (plane) other = shapes[one->a].distance(x);
+        const double apart = off - one->sign * other;
+        const int i = at[one->b], j = plane ? i : at[one->a];
+        square.block<8, 8>(i, i) += kAgreement * row * row.transpose();
+        right.segment<8>(i) -= kAgreement * apart * row;
+        if (plane) continue;
+        square.block<8, 8>(j, j) += kAgreement * back * back.transpose();
+        square.block<8, 8>(i, j) -= kAgreement * row * back.transpose();
+        square.block<8, 8>(j, i) -= kAgreement * back * row.transpose();
+        right.segment<8>(j) += kAgreement * apart * back;
+      }
+    square.diagonal().array() += kDamping * square.diagonal().maxCoeff() / kAgreement;
+    const Eigen::VectorXd step = square.ldlt().solve(right);
+    if (!step.allFinite()) break;
+    for (const int f : faces) move(shapes[f], centers[at[f] / 8], size, step.segment<8>(at[f]));
+    worst = disagreement(shapes, contacts);
   }
-
-  std::vector<Primitive>& shapes_;
-  const std::vector<std::vector<Vec3>>& points_;
-};
+  // Kept if they agree better and still go through their vertices.
+  bool kept = worst < first;
+  for (const int f : faces)
+    for (const Vec3& x : points[f])
+      kept = kept && std::abs(shapes[f].distance(x)) <=
+                         std::max(tolerance, 2 * std::abs(before[f].distance(x)));
+  if (!kept) shapes = before;
+}
 
 }  // namespace
 
@@ -165,10 +158,9 @@ void agree_on_borders(const Shell& shell, Faces& faces, double tolerance) {
   for (std::size_t f = 0; f < points.size(); ++f)
     if (!is_plane(int(f)) && !points[f].empty())
       by_chain[chains.find(int(f))].first.push_back(int(f));
-  Agreement agreement(faces.shapes, points);
   for (const auto& [root, chain] : by_chain)
     if (!chain.second.empty() && chain.first.size() <= kMostFaces)
-      agreement.settle(chain.first, chain.second, shell.size(), tolerance);
+      settle(chain.first, chain.second, points, shell.size(), tolerance, faces.shapes);
 }
 
 }  // namespace sphshell

@@ -1,13 +1,11 @@
 #include "shell/faces/coplanar.hpp"
 
-#include <Eigen/Dense>
-#include <array>
 #include <cstring>
 
+#include "shell/faces/primitive.hpp"
 #include "shell/in_parallel.hpp"
 
 namespace sphshell {
-namespace {
 
 // Facets whose normals differ by more than this (cosine) are not in one plane, slivers included.
 constexpr double kSameSide = 0.9;
@@ -16,34 +14,18 @@ constexpr double kSameSide = 0.9;
 constexpr double kBeside = 30;
 constexpr std::size_t kLooksPerTriangle = 8, kFewLooks = 300;
 
-// The plane of least squares over the areas of triangles, by their moments about a point.
-class PlaneFit {
- public:
-  explicit PlaneFit(const Vec3& about) : about_(about) {}
-
-  void add(double area, const std::array<Vec3, 3>& corners) {
-    area_ += area;
-    for (const Vec3& x : corners) {
-      first_ += area / 3 * (x - about_);
-      second_ += area / 3 * (x - about_) * (x - about_).transpose();
-    }
+void Moments::add(double area, const std::array<Vec3, 3>& corners) {
+  area_ += area;
+  for (const Vec3& x : corners) {
+    first_ += area / 3 * (x - about_);
+    second_ += area / 3 * (x - about_) * (x - about_).transpose();
   }
+}
 
-  Vec3 middle() const { return about_ + first_ / area_; }
-  // On the side of `side`.
-  Vec3 normal(const Vec3& side) const {
-    const Eigen::Matrix3d spread = second_ / area_ - first_ / area_ * (first_ / area_).transpose();
-    const Vec3 out = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvectors().col(0);
-    return out.dot(side) < 0 ? Vec3(-out) : out;
-  }
-
- private:
-  Vec3 about_, first_ = Vec3::Zero();
-  Eigen::Matrix3d second_ = Eigen::Matrix3d::Zero();
-  double area_ = 0;
-};
-
-}  // namespace
+Vec3 Moments::normal(const Vec3& side) const {
+  const Vec3 out = eigenvectors(second()).col(0);
+  return out.dot(side) < 0 ? Vec3(-out) : out;
+}
 
 CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
     : of_(shell.triangles().size(), -1), alone_(shell.triangles().size()) {
@@ -131,11 +113,8 @@ CoplanarRegions::CoplanarRegions(const Shell& shell, double tolerance)
       grew = false;
       const std::size_t before = found.size();
       const int beside = next;
-      PlaneFit fit(plane.second);
-      const auto add = [&](int t) {
-        const Triangle& c = triangles[t];
-        fit.add(area[t], {p[c[0]], p[c[1]], p[c[2]]});
-      };
+      Moments fit(plane.second);
+      const auto add = [&](int t) { fit.add(area[t], shell.corners(t)); };
       for (const int t : found) add(t);
       for (const bool with_beside : {false, true}) {
         if (grew) break;

@@ -11,6 +11,24 @@ inline bool is_precise(const Shell& shell, double tolerance) {
   return tolerance < 3e-7 * shell.size();
 }
 
+// The moments of coplanar triangles, about a point near them against cancellation.
+class Moments {
+ public:
+  explicit Moments(const Vec3& about = Vec3::Zero()) : about_(about) {}
+
+  void add(double area, const std::array<Vec3, 3>& corners);
+  Vec3 middle() const { return about_ + first_ / area_; }
+  // About the middle, over the area [m^2].
+  Mat3 second() const { return second_ / area_ - first_ / area_ * (first_ / area_).transpose(); }
+  // Of the plane of least squares, on the side of `side`.
+  Vec3 normal(const Vec3& side) const;
+
+ private:
+  Vec3 about_, first_ = Vec3::Zero();
+  Mat3 second_ = Mat3::Zero();
+  double area_ = 0;
+};
+
 // Connected triangles that lie in one plane within a tolerance, largest triangles first.
 class CoplanarRegions {
  public:

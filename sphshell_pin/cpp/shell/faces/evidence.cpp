@@ -67,8 +67,7 @@ std::vector<int> Recognizer::inner_vertices(const Growth& growth) {
       const int u = topology.neighbor(3 * t + k);
       if (u >= 0 && is_marked(u)) continue;
       const Edge& edge = topology.edge_at(3 * t + k);
-      border.push_back(edge.first_vertex);
-      border.push_back(edge.last_vertex);
+      border.insert(border.end(), {edge.first_vertex, edge.last_vertex});
     }
   std::sort(border.begin(), border.end());
   std::vector<int> out;
@@ -139,7 +138,7 @@ bool Recognizer::is_over_determined(const Growth& growth) {
     // Two parallel circles lie on a sphere, and so do three that are symmetric.
     std::vector<Vec3> axes;
     for (const Mat3& m : {spread, turn}) {
-      const Mat3 vectors = Eigen::SelfAdjointEigenSolver<Mat3>(m).eigenvectors();
+      const Mat3 vectors = eigenvectors(m);
       for (int k = 0; k < 3; ++k) axes.push_back(vectors.col(k));
     }
     for (const Primitive& ring : guess_primitives(FaceKind::Torus, sample(triangles)))

@@ -271,6 +271,13 @@ class CellMaker {
     return true;
   }
 
+  // The point of a joint next to x.
+  Vec3 on_joint(const FaceJoint& joint, Vec3 x) const {
+    if (joint.kind != FaceJoint::Kind::Crossing) return joint.nearest(x);
+    onto_both(faces_.shapes[joint.face[0]], joint.across[0], x);
+    return x;
+  }
+
   // Writes a joint to the facets on both sides of it. False, and to none, if it does not divide
   // them: where a joint is tangent and the surface smooth, they are on two sides of one shape.
   bool agree(int j, int h, int g) {
@@ -286,12 +293,8 @@ class CellMaker {
       const CubicCurve side = facets_[f].side(facet, k);
       for (const double s : {0.0, 0.15, 0.3, 0.5, 0.7, 0.85, 1.0}) {
         const Vec3 x = side.point(s);
-        Vec3 on = x;
-        if (joint.kind == FaceJoint::Kind::Crossing) {
-          if (s > 0 && s < 1) onto_both(faces_.shapes[joint.face[0]], joint.across[0], on);
-        } else {
-          on = joint.nearest(x);
-        }
+        const bool end = s == 0 || s == 1;
+        const Vec3 on = end && joint.kind == FaceJoint::Kind::Crossing ? x : on_joint(joint, x);
         bulge = std::max(bulge, (on - p - s * (q - p)).norm());
         if (s != 0.5) continue;
         const int face = of_facet(f).face;
@@ -374,11 +377,8 @@ class CellMaker {
     const auto vertex = [&](int h) { return shell_.vertex(shell_.half_edge(h)); };
     const auto on_border = [&](int h, double s) -> Vec3 {
       const int f = triangle_of(h), k = side_of(h);
-      const FaceJoint& joint = faces_.joints[of_facet(f).joint[k]];
-      Vec3 x = facets_[f].side(shell_.facets()[f], k).point(s);
-      if (joint.kind != FaceJoint::Kind::Crossing) return joint.nearest(x);
-      onto_both(faces_.shapes[joint.face[0]], joint.across[0], x);
-      return x;
+      return on_joint(faces_.joints[of_facet(f).joint[k]],
+                      facets_[f].side(shell_.facets()[f], k).point(s));
     };
     const auto inside = [&](int f, int k, const Vec3& x, double margin) {
       const FaceCell& cell = of_facet(f);

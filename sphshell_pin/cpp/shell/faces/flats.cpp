@@ -55,7 +55,6 @@ class Search {
   const Vec3& place(int vertex) const { return shell_.vertices()[vertex]; }
   int start(int h) const { return shell_.vertex(h); }
   int end(int h) const { return start(corner_after(h)); }
-  Vec3 along(int h) const { return shell_.along(h); }
 
   bool is_plane(int triangle) const {
     const int f = triangle_of(shell_.facet_half_edge(3 * triangle));
@@ -117,7 +116,7 @@ class Search {
       std::vector<int> loop;
       Vec3 area = Vec3::Zero();
       for (auto at = from.begin(); at != from.end(); at = from.find(end(loop.back()))) {
-        area += place(start(at->second)).cross(along(at->second));
+        area += place(start(at->second)).cross(shell_.along(at->second));
         loop.push_back(at->second);
         from.erase(at);
       }
@@ -128,9 +127,9 @@ class Search {
     out.convex = !out.sides.empty();
     for (std::size_t i = 0; i < out.sides.size(); ++i) {
       const int h = out.sides[i], curve = curve_of(h);
-      const Vec3 turn = along(h).cross(along(out.sides[(i + 1) % out.sides.size()]));
-      out.convex =
-          out.convex && turn.dot(out.normal) > -kFlatBeyond * shell_.size() * along(h).norm();
+      const Vec3 turn = shell_.along(h).cross(shell_.along(out.sides[(i + 1) % out.sides.size()]));
+      out.convex = out.convex &&
+                   turn.dot(out.normal) > -kFlatBeyond * shell_.size() * shell_.along(h).norm();
       out.straight = out.straight && curve == -1;
       out.circle = i == 0 || out.circle == curve ? curve : -2;
     }
@@ -181,7 +180,8 @@ class Search {
     const std::vector<int>& sides = outlines_[face].sides;
     std::vector<int> corners;
     for (std::size_t i = 0; i < sides.size(); ++i) {
-      const Vec3 before = along(sides[i]), after = along(sides[(i + 1) % sides.size()]);
+      const Vec3 before = shell_.along(sides[i]),
+                 after = shell_.along(sides[(i + 1) % sides.size()]);
       if (before.cross(after).norm() > kFlatBeyond * before.norm() * after.norm())
         corners.push_back(end(sides[i]));
     }

@@ -12,11 +12,6 @@ constexpr double kFlattestCone = 1.5;
 
 double radius_or_zero(double square) { return square > 0 ? std::sqrt(square) : 0; }
 
-// The eigenvectors of a symmetric matrix, that of the smallest eigenvalue first.
-Mat3 eigenvectors(const Mat3& symmetric) {
-  return Eigen::SelfAdjointEigenSolver<Mat3>(symmetric).eigenvectors();
-}
-
 // Rank-revealing: what the points do not determine stays as it is (a basic solution).
 template <class Matrix, class Vector>
 Eigen::VectorXd least_squares(const Matrix& a, const Vector& b) {
@@ -112,6 +107,10 @@ bool is_sound(const Primitive& p) {
 
 }  // namespace
 
+Mat3 eigenvectors(const Mat3& symmetric) {
+  return Eigen::SelfAdjointEigenSolver<Mat3>(symmetric).eigenvectors();
+}
+
 // In closed form, positive outside; the normal is its gradient. 1e-300: on the axis or at the
 // center there is no direction, and the result is finite.
 double Primitive::distance_of_curved(const Vec3& x, Vec3& normal) const {
@@ -188,7 +187,8 @@ Vec3 Primitive::at(const Eigen::Vector2d& place, double size, Vec3* along) const
   return point + off * out + height * axis;
 }
 
-bool Primitive::is_on_axis(const Vec3& x, double share) const {
+bool Primitive::singular(const Vec3& x, double share) const {
+  if (kind == FaceKind::Plane) return false;
   const AboutAxis at(*this, x);
   if (kind == FaceKind::Sphere) return at.y.norm() < share * radius;
   const double size = std::max(std::abs(radius), std::abs(at.h));

@@ -5,8 +5,6 @@
 
 namespace sphshell {
 
-using Mat3 = Eigen::Matrix3d;
-
 enum class FaceKind : int { Plane = 0, Cylinder = 1, Cone = 2, Sphere = 3, Torus = 4 };
 
 // A surface with a closest point in closed form. Lengths in meters, angles in radians.
@@ -51,13 +49,10 @@ struct Primitive {
   Mat3 hessian(const Vec3& x) const;
   // Whether x is so near the axis or the center, to this share of the radius, that the gradient has
   // no direction there.
-  bool singular(const Vec3& x, double share) const {
-    return kind != FaceKind::Plane && is_on_axis(x, share);
-  }
+  bool singular(const Vec3& x, double share) const;
 
  private:
   double distance_of_curved(const Vec3& x, Vec3& normal) const;
-  bool is_on_axis(const Vec3& x, double share) const;
 };
 
 // How the curve goes on which two shapes are zero, at a point next to it: the derivatives of the
@@ -69,6 +64,9 @@ struct Intersection {
 };
 // At a point that need not be on it yet.
 Intersection intersection_at(const Primitive& one, const Primitive& other, const Vec3& x);
+
+// The eigenvectors of a symmetric matrix, that of the smallest eigenvalue first.
+Mat3 eigenvectors(const Mat3& symmetric);
 
 // How many numbers describe a primitive of a kind.
 int num_parameters(FaceKind kind);

@@ -1,7 +1,5 @@
 #include "shell/faces/recognition.hpp"
 
-#include <Eigen/Dense>
-
 #include "shell/faces/recognizer.hpp"
 
 namespace sphshell {
@@ -74,11 +72,6 @@ double Recognizer::off(int t, const Primitive& shape) const {
   double most = 0;
   for (const int v : corners(t)) most = std::max(most, std::abs(shape.distance(point(v))));
   return most;
-}
-
-// The angle [rad] between the normals of two facets.
-double Recognizer::turn(int t, int u) const {
-  return angle_between(facet_normal(t), facet_normal(u));
 }
 
 std::vector<int> Recognizer::vertices_of(const std::vector<int>& triangles) const {
@@ -221,38 +214,6 @@ void Recognizer::drop_zones_of_free_shapes() {
     for (const int t : faces_[f].triangles) of_[t] = -1;
 }
 
-// Per region that has a row; most have none.
-std::vector<Recognizer::Moments> Recognizer::moments_of_regions(const std::vector<int>& row,
-                                                                std::size_t rows) const {
-  std::vector<Moments> out(rows);
-  std::vector<Vec3> origin(rows, Vec3::Zero());
-  for (std::size_t t = 0; t < of_.size(); ++t) {
-    if (regions_.is_alone(int(t))) continue;
-    const int r = row[regions_.of(int(t))];
-    if (out[r].area == 0) origin[r] = point(corners(int(t))[0]);
-    out[r].area += area(int(t));
-    out[r].middle += area(int(t)) * (centroid(int(t)) - origin[r]);
-  }
-  for (std::size_t r = 0; r < out.size(); ++r)
-    out[r].middle = origin[r] + out[r].middle / std::max(out[r].area, 1e-300);
-  for (std::size_t t = 0; t < of_.size(); ++t) {
-    if (regions_.is_alone(int(t))) continue;
-    Moments& of = out[row[regions_.of(int(t))]];
-    const double share = area(int(t)) / std::max(of.area, 1e-300);
-    // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
-    const auto add = [&](const Vec3& x, double weight) {
-      of.second += weight * share * (x - of.middle) * (x - of.middle).transpose();
-    };
-    add(centroid(int(t)), 0.75);
-    for (const int v : corners(int(t))) {
-      add(point(v), 1.0 / 12);
-      const Vec3& normal = regions_.normal(regions_.of(int(t)));
-      of.off = std::max(of.off, std::abs((point(v) - of.middle).dot(normal)));
-    }
-  }
-  return out;
-}
-
 // How far a region reaches from the middle of a side, straight across it [m]: a strip that goes
 // around a corner is no wider there than elsewhere.
 double Recognizer::reach_across(int h) const {
@@ -292,13 +253,33 @@ void Recognizer::add_planes(Faces& faces) const {
     double narrow = 0, alike = std::numeric_limits<double>::infinity(), sagitta = alike;
   };
   std::vector<Turns> turns(rows);
-  const std::vector<Moments> moments = moments_of_regions(row, rows);
+  // Of coplanar regions of several triangles.
+  std::vector<Moments> moments(rows);
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    if (regions_.is_alone(int(t))) continue;
+    const int r = row[regions_.of(int(t))];
+    if (some[r] < 0) moments[r] = Moments(shell_.point(3 * int(t)));
+    some[r] = static_cast<int>(t);
+    // A triangle has the moments of its corners and its middle, weighted 1 : 1 : 1 : 9.
+    const Vec3 middle = centroid(int(t));
+    moments[r].add(area(int(t)) / 4, shell_.corners(int(t)));
+    moments[r].add(area(int(t)) * 3 / 4, {middle, middle, middle});
+  }
+  // How far a vertex is off the plane of the largest triangle [m].
+  std::vector<double> apart(rows, 0);
+  for (std::size_t t = 0; t < of_.size(); ++t) {
+    if (regions_.is_alone(int(t))) continue;
+    const int r = row[regions_.of(int(t))];
+    const Vec3 middle = moments[r].middle(), &normal = regions_.normal(regions_.of(int(t)));
+    for (const Vec3& x : shell_.corners(int(t)))
+      apart[r] = std::max(apart[r], std::abs((x - middle).dot(normal)));
+  }
   // Of a region across a side: that of a rectangle with the same second moment [m].
   const auto width = [&](int h) {
     const int t = triangle_of(h), r = regions_.of(t);
     if (regions_.is_alone(t)) return regions_.height(h);
     const Vec3 across = regions_.normal(r).cross(shell_.along(h)).normalized();
-    return std::sqrt(12 * across.dot(moments[row[r]].second * across));
+    return std::sqrt(std::max(12 * across.dot(moments[row[r]].second() * across), 0.0));
   };
   for (std::size_t t = 0; t < of_.size(); ++t) {
     // Each triangle may speak against its region.
@@ -344,11 +325,8 @@ void Recognizer::add_planes(Faces& faces) const {
       // Fitted where the vertices are off the plane of the largest triangle by their rounding.
       const Vec3& own = regions_.normal(region);
       std::pair<Vec3, Vec3> plane{point(corners(some[r])[0]), own};
-      if (moments[r].off > kMostGap * shell_.size()) {
-        const Eigen::SelfAdjointEigenSolver<Mat3> solver(moments[r].second);
-        const Vec3 normal = solver.eigenvectors().col(0);
-        plane = {moments[r].middle, normal.dot(own) < 0 ? Vec3(-normal) : normal};
-      }
+      if (apart[r] > kMostGap * shell_.size())
+        plane = {moments[r].middle(), moments[r].normal(own)};
       // A plane has no second number: it says whether the plane is inscribed in a round face.
       faces.shapes.push_back(
           {FaceKind::Plane, plane.first, plane.second, 0, double(is_own_plane(int(t)))});

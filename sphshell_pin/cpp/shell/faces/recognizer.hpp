@@ -92,7 +92,8 @@ class Recognizer {
   double longest_side(int t) const;
   // Of its corners from a shape, the largest distance [m].
   double off(int t, const Primitive& shape) const;
-  double turn(int t, int u) const;  // [rad]
+  // The angle between the normals of two [rad].
+  double turn(int t, int u) const { return angle_between(facet_normal(t), facet_normal(u)); }
   // Each once, ascending.
   std::vector<int> vertices_of(const std::vector<int>& triangles) const;
   FacetSample sample(const std::vector<int>& triangles) const;
@@ -158,14 +159,6 @@ class Recognizer {
   void drop_zones_of_free_shapes();
   double reach_across(int half_edge) const;  // [m]
   void add_planes(Faces& faces) const;
-  // Of coplanar regions of several triangles.
-  struct Moments {
-    double area = 0;             // [m^2]
-    Vec3 middle = Vec3::Zero();  // [m]
-    Mat3 second = Mat3::Zero();  // about the middle, over the area [m^2]
-    double off = 0;              // of a vertex from the plane of the largest triangle [m]
-  };
-  std::vector<Moments> moments_of_regions(const std::vector<int>& row, std::size_t rows) const;
 
   const Shell& shell_;
   const CoplanarRegions& regions_;

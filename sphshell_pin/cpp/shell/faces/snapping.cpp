@@ -170,8 +170,8 @@ void settle_on_faces(const Shell& shell, const Edge& edge, const Faces& faces, c
                      const Vec3& d, std::array<Vec3, 2>& offset) {
   if (faces.of.empty() || edge.kind == EdgeClass::Boundary) return;
   std::vector<int> around;
-  for (int i = 0; i < edge.count; ++i)
-    around.push_back(faces.of_triangle(triangle_of(shell.topology().incidence[edge.begin + i])));
+  for (const int h : shell.topology().around(edge))
+    around.push_back(faces.of_triangle(triangle_of(h)));
   // Within a face the curve has the face's own normals at its ends, which it keeps, but at the tip
   // of a cone there are none; between planes it is straight.
   bool border = false, curved = false;
