@@ -1,7 +1,5 @@
 """Robots' files of all formats: read into one description, then into Pinocchio's models."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import os
@@ -48,14 +46,7 @@ _REFUSED = {
     "robot's URDF or xacro, or convert it to MJCF (pip install sdformat-mjcf)",
     (".usd", ".usda", ".usdc", ".usdz"): "is a USD file, which pinocchio does not read: export "
     "a URDF or MJCF from the program that made it (Isaac Sim has an exporter to URDF)",
-    (
-        ".dae",
-        ".stl",
-        ".obj",
-        ".ply",
-        ".gltf",
-        ".glb",
-    ): "is a mesh, without joints and masses: "
+    (".dae", ".stl", ".obj", ".ply", ".gltf", ".glb"): "is a mesh, without joints and masses: "
     "write a URDF or MJCF with a link that names it; as a surface to touch it is a shell's file",
     (".step", ".stp", ".iges", ".igs", ".brep"): "is a CAD file, without joints and masses: "
     "export a URDF from the CAD program; as a surface to touch it is a shell's file",

@@ -1,7 +1,5 @@
 """Commands on surface files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -44,11 +44,7 @@ _TRANSFORMS, _WRENCH = "tf2_msgs/TFMessage", "geometry_msgs/WrenchStamped"
 
 
 def write_mcap(
-    path: str | PathLike[str],
-    result: Result,
-    scene: Scene | None = None,
-    *,
-    start: int = 0,
+    path: str | PathLike[str], result: Result, scene: Scene | None = None, *, start: int = 0
 ) -> Path:
     """Write `result` as an MCAP file; see `Result.to_mcap`."""
     mcap = import_extra("mcap_ros2.writer", "mcap", "Result.to_mcap", "mcap-ros2-support")

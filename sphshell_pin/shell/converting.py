@@ -1,7 +1,5 @@
 """From one surface file to another, and how far apart they are."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What a user asks of a new scenario, as one object."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike

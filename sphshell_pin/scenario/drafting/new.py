@@ -1,7 +1,5 @@
 """A new scenario from a robot and a surface, with values chosen for their sizes."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace

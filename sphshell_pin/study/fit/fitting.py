@@ -73,11 +73,7 @@ def fit(
 
 
 def _trials(
-    base: Scenario,
-    path: Path,
-    free: Sequence[Free],
-    data: Data,
-    columns: Collection[str] | None,
+    base: Scenario, path: Path, free: Sequence[Free], data: Data, columns: Collection[str] | None
 ) -> list[Trial]:
     several = isinstance(data, Sequence) and not isinstance(data, str)
     given: Sequence[Source | Experiment] = data if several else [data]  # type: ignore[list-item, assignment]

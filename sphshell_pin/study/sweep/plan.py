@@ -1,7 +1,5 @@
 """What a sweep will do: its runs, checked before anything is computed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
