@@ -28,8 +28,8 @@ from sphshell_pin.scenario.running.kept_scenario import keep
 
 RECORDING = "recording.html"
 SUMMARY = "summary.json"
-STOPPED = "stopped"
-"""Subfolder for what a run computed that stopped early, beside an earlier one's results."""
+STOPPED = "-stopped"
+"""Ends the name of the folder for what a run computed that stopped early, beside complete results."""
 
 # What a run writes: a later one replaces all of it, so that no folder mixes two runs.
 RESULTS = (
@@ -77,8 +77,8 @@ def run_scenario(
 
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
-    has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
+    has the results of a complete run, it is written to a folder beside it, "NAME-stopped". Files
+    take the place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
     `recording` or `figures` no recording.html or no pictures are made, which take most of the time
     of a short run.
 
@@ -107,14 +107,15 @@ def run_built(
     check_expectations(built)
     folder = Path("results") / built.name if out is None else Path(out)
     with contextlib.ExitStack() as held:
-        place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
+        place = held.enter_context(held_folder(folder, SUMMARY))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
-            folder = folder / STOPPED
-            place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
+            named = folder if folder.name else folder.absolute()
+            folder = named.with_name(named.name + STOPPED)
+            place = held.enter_context(held_folder(folder, SUMMARY))
         try:
             staging = place.staging()
             result.save(staging / "run.npz", home=folder)
