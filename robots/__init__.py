@@ -35,12 +35,7 @@ _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
 # Own robots, and whether their root floats freely.
-OWN: dict[str, bool] = {
-    "ball": True,
-    "gear_pair": False,
-    "three_link_finger": False,
-    "turntable": False,
-}
+OWN = {"ball": True, "gear_pair": False, "three_link_finger": False, "turntable": False}
 
 # Fingertips of robots whose collision geometry has no spheres: frame, radius [m], offset [m].
 TIPS: dict[str, tuple[tuple[str, float, tuple[float, float, float]], ...]] = {

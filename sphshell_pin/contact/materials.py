@@ -116,9 +116,5 @@ class TwoMaterials:
 def elastic_numbers(sphere: str, shell: str) -> dict[str, float]:
     """Return the parameters of TwoMaterials that follow from two names of MATERIALS."""
     one, other = find_material(sphere), find_material(shell)
-    return {
-        "young": one.young,
-        "poisson": one.poisson,
-        "young_2": other.young,
-        "poisson_2": other.poisson,
-    }
+    second = {"young_2": other.young, "poisson_2": other.poisson}
+    return {"young": one.young, "poisson": one.poisson, **second}

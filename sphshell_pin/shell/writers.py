@@ -5,7 +5,6 @@ A file appears whole or not at all.
 
 import os
 import struct
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -184,11 +183,5 @@ def _ply(surface: Written) -> bytes:
     return _text(head + body + surface.rows(0))
 
 
-WRITERS: dict[str, Callable[[Written], bytes]] = {
-    ".shl": _shl,
-    ".stl": _stl,
-    ".obj": _obj,
-    ".ply": _ply,
-    ".off": _off,
-}
+WRITERS = {".shl": _shl, ".stl": _stl, ".obj": _obj, ".ply": _ply, ".off": _off}
 """Writers by suffix."""

@@ -117,23 +117,14 @@ def lattice(ticks: Array) -> tuple[Array, IntArray]:
 
 def sphere(radius: float, segments: int = 32) -> Json:
     """Geometry of a sphere of `radius` [m]."""
-    return {
-        "type": "SphereGeometry",
-        "radius": radius,
-        "widthSegments": segments,
-        "heightSegments": segments // 2,
-    }
+    fine = {"widthSegments": segments, "heightSegments": segments // 2}
+    return {"type": "SphereGeometry", "radius": radius, **fine}
 
 
 def rod(radius_start: float, radius_end: float) -> Json:
     """Geometry of a rod or cone along y, one unit long and centered, as three.js has it."""
-    return {
-        "type": "CylinderGeometry",
-        "radiusTop": radius_end,
-        "radiusBottom": radius_start,
-        "height": 1.0,
-        "radialSegments": 24,
-    }
+    radii = {"radiusTop": radius_end, "radiusBottom": radius_start}
+    return {"type": "CylinderGeometry", **radii, "height": 1.0, "radialSegments": 24}
 
 
 def material(kind: str, color: int, opacity: float = 1.0, **properties: object) -> Json:

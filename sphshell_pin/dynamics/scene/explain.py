@@ -168,14 +168,8 @@ def _recommended_dt(shortest: float) -> float:
 
 
 # What a model may state of its joints, as a reader calls it.
-_JOINT_KINDS = {
-    "limits": "position limits",
-    "damping": "damping",
-    "friction": "dry friction",
-    "armature": "armature",
-    "effort": "effort limits",
-    "speed": "speed limits",
-}
+_JOINT_KINDS = {"limits": "position limits", "effort": "effort limits", "speed": "speed limits"}
+_JOINT_KINDS |= {"damping": "damping", "friction": "dry friction", "armature": "armature"}
 
 
 def _joints_modelled(scene: Scene) -> list[str]:

@@ -29,21 +29,11 @@ from sphshell_pin.scenario.running.kept_scenario import keep
 RECORDING = "recording.html"
 SUMMARY = "summary.json"
 STOPPED = "-stopped"
-"""Ends the name of the folder for what a run computed that stopped early, beside complete results."""
+"""Ends the name of the folder for what stopped early, beside that of complete results."""
 
 # What a run writes: a later one replaces all of it, so that no folder mixes two runs.
-RESULTS = (
-    "run.npz",
-    "contacts.csv",
-    "sensors.csv",
-    SUMMARY,
-    "force_and_depth.png",
-    "energy.png",
-    "contact_path.png",  # of earlier versions
-    "contact_map.png",
-    "sensors.png",
-    RECORDING,
-)
+RESULTS: tuple[str, ...] = ("run.npz", "contacts.csv", "sensors.csv", SUMMARY)
+RESULTS += ("force_and_depth.png", "energy.png", "contact_map.png", "sensors.png", RECORDING)
 
 
 @dataclass(frozen=True)
