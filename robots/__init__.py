@@ -4,14 +4,13 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_bytes, why_no_file
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import Mimic, shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
@@ -142,14 +141,14 @@ def load(
 
 
 def load_file(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
+    path: StrPath,
+    package_dirs: Iterable[StrPath] = (),
     *,
     free_flyer: bool | None = None,
     mimic: bool = False,
     name: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
-    srdf: str | PathLike[str] | None = None,
+    srdf: StrPath | None = None,
     pose: str | None = None,
     density: float | None = None,
 ) -> LoadedRobot:
@@ -294,7 +293,7 @@ def _mimicking(robot: LoadedRobot, rules: Iterable[Mimic], what: str) -> LoadedR
     return replace(robot, model=model, q0=shortened(model, robot.q0))
 
 
-def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
+def _load_poses(model: pin.Model, srdf: StrPath | None) -> None:
     if srdf is None:
         return
     if reason := why_no_file(srdf):

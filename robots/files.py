@@ -7,13 +7,12 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
@@ -62,8 +61,8 @@ _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files
 
 
 def read(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
+    path: StrPath,
+    package_dirs: Iterable[StrPath] = (),
     xacro_args: Mapping[str, object] | None = None,
     *,
     free_flyer: bool | None = None,
@@ -143,7 +142,7 @@ def _not_read(file: Path, tag: str, error: Exception) -> str:
     return f"not {kind} that can be read: {_line(error)}"
 
 
-def is_path(robot: str | PathLike[str]) -> bool:
+def is_path(robot: StrPath) -> bool:
     """Whether `robot` is meant as a file, not as a name."""
     known = (".urdf", ".xacro", ".xml", ".mjcf", *(one for ends in _REFUSED for one in ends))
     return Path(robot).suffix.lower() in known or "/" in str(robot) or os.path.isfile(robot)

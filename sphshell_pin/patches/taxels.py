@@ -1,7 +1,6 @@
 """Tactile sensors: what each cell of a grid on a sphere, or of a shell, feels of the patches."""
 
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
@@ -11,6 +10,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of
@@ -44,7 +44,7 @@ class TaxelImages(Summarized):
     forces: Array
     outside: Array
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: StrPath) -> Path:
         """Write the arrays to a compressed .npz file, and return its path."""
         with atomic_file(Path(path)) as stream:
             np.savez_compressed(stream, t=self.t, forces=self.forces, outside=self.outside)

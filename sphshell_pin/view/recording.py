@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -42,7 +42,7 @@ MOST_FRAMES = 1_000_000
 
 
 def write_recording(
-    path: str | PathLike[str],
+    path: StrPath,
     result: Result,
     scene: Scene,
     visual_model: pin.GeometryModel | None = None,
@@ -171,7 +171,7 @@ class RecordingView:
     height: int = 480
     hint: str = ""
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: StrPath) -> Path:
         """Write the page at `path` and return it; ResultError if it cannot be written."""
         return write_whole(path, self.page.encode())
 

@@ -9,13 +9,13 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.atomic.file import holder, lock_file, sign, sync_file, sync_folder
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import ResultError
 
 _AT_FDCWD = -100
@@ -73,7 +73,7 @@ class AtomicFolder:
         It cannot be made or written.
     """
 
-    def __init__(self, path: str | PathLike[str], *, last: str) -> None:
+    def __init__(self, path: StrPath, *, last: str) -> None:
         self._folder = Path(os.path.realpath(path))
         self._last = last
         self._made: list[Path] = []
@@ -334,9 +334,7 @@ def held_folder(folder: Path, last: str) -> Iterator[AtomicFolder]:
 
 
 def write_folder(
-    folder: str | PathLike[str],
-    files: Mapping[str, bytes] | Iterable[tuple[str, bytes]],
-    every: Sequence[str],
+    folder: StrPath, files: Mapping[str, bytes] | Iterable[tuple[str, bytes]], every: Sequence[str]
 ) -> list[Path]:
     """Write `files`, names and contents, into `folder`, all or none; return their paths.
 

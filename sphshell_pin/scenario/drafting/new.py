@@ -3,14 +3,13 @@
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
@@ -42,9 +41,7 @@ _DENSITY = 2700.0
 _MOST_ENDS = 2
 
 
-def new_scenario(
-    robot: str | PathLike[str], surface: str | PathLike[str] = "plane", **options: Any
-) -> NewScenario:
+def new_scenario(robot: StrPath, surface: StrPath = "plane", **options: Any) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
     Drafts are run; the first is written that touches, holds its force within 5 %, and keeps the

@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from sphshell_pin import errors
 from sphshell_pin._versions import __version__
 from sphshell_pin.base.atomic.files import held_folder
-from sphshell_pin.base.regular_file import open_regular, read_text
+from sphshell_pin.base.regular_file import StrPath, open_regular, read_text
 from sphshell_pin.base.tables import csv_text
 from sphshell_pin.base.texts import json_text, plain
 from sphshell_pin.dynamics.control.controllers import Controller
@@ -55,8 +54,8 @@ class RunReport:
 
 
 def run_scenario(
-    name: str | PathLike[str],
-    out: str | PathLike[str] | None = None,
+    name: StrPath,
+    out: StrPath | None = None,
     *,
     changes: Mapping[str, str] | None = None,
     recording: bool = True,
@@ -87,7 +86,7 @@ def run_scenario(
 
 def run_built(
     built: Built,
-    out: str | PathLike[str] | None = None,
+    out: StrPath | None = None,
     *,
     recording: bool = True,
     figures: bool = True,

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from sphshell_pin.base.checks import check_type
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.options import CAD_SUFFIXES
 from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_stl
@@ -19,7 +19,7 @@ READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply, ".off": read_of
 SUFFIXES = (*READERS, ".shl", *CAD_SUFFIXES)
 
 
-def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
+def reader_for(path: StrPath) -> tuple[Path, str]:
     """Return the path and its suffix in lower case, after a check that such a file can be read.
 
     Raises

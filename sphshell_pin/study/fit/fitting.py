@@ -2,11 +2,11 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format import reading
 from sphshell_pin.scenario.format.build import build_scenario
@@ -21,7 +21,7 @@ Data = Source | Experiment | Sequence[Source | Experiment]
 
 
 def fit(
-    scenario: str | PathLike[str],
+    scenario: StrPath,
     data: Data,
     parameters: Wanted,
     *,

@@ -14,6 +14,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.live.loop import Live
 from sphshell_pin.view.live.panel import check_speed
@@ -114,7 +115,7 @@ def player_of(what: object, *, changes: Mapping[str, str] | None = None) -> Play
     )
 
 
-def result_file(what: str | PathLike[str]) -> Path | None:
+def result_file(what: StrPath) -> Path | None:
     """Return the file of the finished run that `what` names; None if it names a scenario.
 
     Raises ResultError for a folder without one.
