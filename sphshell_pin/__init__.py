@@ -32,8 +32,18 @@ if TYPE_CHECKING:
 
 upward.layers = UpperLayers()
 
-_PARTS = ["contact", "dynamics", "errors", "patches", "results", "robots"]
-_PARTS += ["scenario", "shell", "units", "view"]
+_PARTS = (
+    "contact",
+    "dynamics",
+    "errors",
+    "patches",
+    "results",
+    "robots",
+    "scenario",
+    "shell",
+    "units",
+    "view",
+)
 # What a type checker sees above; tests compare the two.
 _NAMES = {
     "contact": "BristleFriction BristleState CoulombFriction Feature FoundationLaw Friction "

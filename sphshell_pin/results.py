@@ -20,8 +20,27 @@ from sphshell_pin.shell.faces import Face
 from sphshell_pin.shell.health import ShellHealth
 from sphshell_pin.shell.queries import ClosestPoints
 
-__all__ = ["CleanedSurface", "ClosestPoints", "ContactForceDerivatives", "ContactLog"]
-__all__ += ["ContactPair", "ContactSet", "DynamicsDerivatives", "EnergyAudit", "Event", "Face"]
-__all__ += ["JointFigures", "PairFigures", "Readings", "Rollout", "RunStats", "SceneContacts"]
-__all__ += ["SceneState", "Sensitivities", "SensorLog", "ShellHealth", "StepDerivatives"]
-__all__ += ["TaxelImages"]
+__all__ = [
+    "CleanedSurface",
+    "ClosestPoints",
+    "ContactForceDerivatives",
+    "ContactLog",
+    "ContactPair",
+    "ContactSet",
+    "DynamicsDerivatives",
+    "EnergyAudit",
+    "Event",
+    "Face",
+    "JointFigures",
+    "PairFigures",
+    "Readings",
+    "Rollout",
+    "RunStats",
+    "SceneContacts",
+    "SceneState",
+    "Sensitivities",
+    "SensorLog",
+    "ShellHealth",
+    "StepDerivatives",
+    "TaxelImages",
+]

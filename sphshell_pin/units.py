@@ -6,8 +6,18 @@ its user, never guessed.
 
 from sphshell_pin.errors import InvalidParameter
 
-METERS_PER_UNIT = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 1e-3, "um": 1e-6, "km": 1e3}
-METERS_PER_UNIT |= {"in": 0.0254, "ft": 0.3048, "yd": 0.9144, "mil": 2.54e-5}
+METERS_PER_UNIT: dict[str, float] = {
+    "m": 1.0,
+    "dm": 0.1,
+    "cm": 0.01,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+    "mil": 2.54e-5,
+}
 """Meters in one unit of length."""
 
 _SPELLINGS = {
@@ -21,9 +31,14 @@ _SPELLINGS = {
 }
 _ALIASES = {one: unit for unit, names in _SPELLINGS.items() for one in names.split()}
 
-_LBF = 4.4482216152605
-ADAMS_UNITS = {"mm-N-s": (1e-3, 1.0), "m-N-s": (1.0, 1.0), "cm-N-s": (1e-2, 1.0)}
-ADAMS_UNITS |= {"cm-dyn-s": (1e-2, 1e-5), "in-lbf-s": (0.0254, _LBF), "ft-lbf-s": (0.3048, _LBF)}
+ADAMS_UNITS: dict[str, tuple[float, float]] = {
+    "mm-N-s": (1e-3, 1.0),
+    "m-N-s": (1.0, 1.0),
+    "cm-N-s": (1e-2, 1.0),
+    "cm-dyn-s": (1e-2, 1e-5),
+    "in-lbf-s": (0.0254, 4.4482216152605),
+    "ft-lbf-s": (0.3048, 4.4482216152605),
+}
 """Meters per length unit and newtons per force unit of ADAMS's unit systems."""
 
 SUSPICIOUS_RATIO = 1000.0

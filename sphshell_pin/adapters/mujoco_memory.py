@@ -91,8 +91,16 @@ def layout() -> list[int]:
     model.opt.integrator, model.opt.enableflags = 0x5EED5EED, 0x6EED6EED
     unused = data.warning[mujoco.mjtWarning.mjWARN_BADQPOS]
     unused.lastinfo = 0x7EED7EED
-    in_data = ["qvel", "plugin_state", "xpos", "xquat", "cvel"]
-    in_data += ["subtree_com", "cdof", "qfrc_passive"]
+    in_data = (
+        "qvel",
+        "plugin_state",
+        "xpos",
+        "xquat",
+        "cvel",
+        "subtree_com",
+        "cdof",
+        "qfrc_passive",
+    )
     numbers, in_model = ("integrator", "enableflags"), ("geom_contype", "geom_conaffinity")
     return [
         _find(data._address, data.time, ctypes.c_double),

@@ -116,5 +116,9 @@ class TwoMaterials:
 def elastic_numbers(sphere: str, shell: str) -> dict[str, float]:
     """Return the parameters of TwoMaterials that follow from two names of MATERIALS."""
     one, other = find_material(sphere), find_material(shell)
-    second = {"young_2": other.young, "poisson_2": other.poisson}
-    return {"young": one.young, "poisson": one.poisson, **second}
+    return {
+        "young": one.young,
+        "poisson": one.poisson,
+        "young_2": other.young,
+        "poisson_2": other.poisson,
+    }

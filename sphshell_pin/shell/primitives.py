@@ -331,6 +331,12 @@ def _square(shape: coal.Halfspace | coal.Plane, extent: float) -> RawSurface:
     return raw.noting(f"a square of {extent:.6g} m stands for the endless {type(shape).__name__}")
 
 
-_BUILDERS: dict[type, Callable[..., RawSurface]] = {coal.Box: _box, coal.Sphere: _ball_shape}
-_BUILDERS |= {coal.Cylinder: _rod, coal.Capsule: _capsule, coal.Cone: _rod}
-_BUILDERS |= {coal.Ellipsoid: _ball_shape, coal.TriangleP: _triangle}
+_BUILDERS: dict[type, Callable[..., RawSurface]] = {
+    coal.Box: _box,
+    coal.Sphere: _ball_shape,
+    coal.Cylinder: _rod,
+    coal.Capsule: _capsule,
+    coal.Cone: _rod,
+    coal.Ellipsoid: _ball_shape,
+    coal.TriangleP: _triangle,
+}

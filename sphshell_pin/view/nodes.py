@@ -117,14 +117,23 @@ def lattice(ticks: Array) -> tuple[Array, IntArray]:
 
 def sphere(radius: float, segments: int = 32) -> Json:
     """Geometry of a sphere of `radius` [m]."""
-    fine = {"widthSegments": segments, "heightSegments": segments // 2}
-    return {"type": "SphereGeometry", "radius": radius, **fine}
+    return {
+        "type": "SphereGeometry",
+        "radius": radius,
+        "widthSegments": segments,
+        "heightSegments": segments // 2,
+    }
 
 
 def rod(radius_start: float, radius_end: float) -> Json:
     """Geometry of a rod or cone along y, one unit long and centered, as three.js has it."""
-    radii = {"radiusTop": radius_end, "radiusBottom": radius_start}
-    return {"type": "CylinderGeometry", **radii, "height": 1.0, "radialSegments": 24}
+    return {
+        "type": "CylinderGeometry",
+        "radiusTop": radius_end,
+        "radiusBottom": radius_start,
+        "height": 1.0,
+        "radialSegments": 24,
+    }
 
 
 def material(kind: str, color: int, opacity: float = 1.0, **properties: object) -> Json:

@@ -36,8 +36,14 @@ def check_coloring(color: str) -> None:
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E
-FACE_COLORS = {"plane": "#9fb4c7", "cylinder": "#e0a458", "cone": "#6a9e78", "sphere": "#b5656a"}
-FACE_COLORS |= {"torus": "#8d7bb0", "none": "#dddddd"}
+FACE_COLORS = {
+    "plane": "#9fb4c7",
+    "cylinder": "#e0a458",
+    "cone": "#6a9e78",
+    "sphere": "#b5656a",
+    "torus": "#8d7bb0",
+    "none": "#dddddd",
+}
 # The surface is pushed back a little, so that lines on it are not drawn half inside it.
 PUSHED_BACK: Json = {"polygonOffset": True, "polygonOffsetFactor": 1.0, "polygonOffsetUnits": 1.0}
 MOST_OUTLINED_EDGES = 60_000

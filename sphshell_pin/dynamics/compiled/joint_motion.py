@@ -17,8 +17,16 @@ if TYPE_CHECKING:
     from casadi import SX
 
 _BINARY = {"OP_ADD": "+", "OP_SUB": "-", "OP_MUL": "*", "OP_DIV": "/"}
-_UNARY = {"OP_ASSIGN": "{0}", "OP_NEG": "-{0}", "OP_SQ": "{0} * {0}", "OP_TWICE": "{0} + {0}"}
-_UNARY |= {"OP_INV": "1. / {0}", "OP_SIN": "sin({0})", "OP_COS": "cos({0})", "OP_SQRT": "sqrt({0})"}
+_UNARY = {
+    "OP_ASSIGN": "{0}",
+    "OP_NEG": "-{0}",
+    "OP_SQ": "{0} * {0}",
+    "OP_TWICE": "{0} + {0}",
+    "OP_INV": "1. / {0}",
+    "OP_SIN": "sin({0})",
+    "OP_COS": "cos({0})",
+    "OP_SQRT": "sqrt({0})",
+}
 
 
 @dataclass
@@ -128,8 +136,12 @@ Expression: TypeAlias = "SX"
 """A matrix of expressions."""
 
 # Joints of several coordinates whose axes are constant in their own frames.
-_SEVERAL = {"JointModelFreeFlyer": (0, 1, 2, 3, 4, 5), "JointModelSpherical": (3, 4, 5)}
-_SEVERAL |= {"JointModelTranslation": (0, 1, 2), "JointModelPlanar": (0, 1, 5)}
+_SEVERAL = {
+    "JointModelFreeFlyer": (0, 1, 2, 3, 4, 5),
+    "JointModelSpherical": (3, 4, 5),
+    "JointModelTranslation": (0, 1, 2),
+    "JointModelPlanar": (0, 1, 5),
+}
 # Entries of rotations that are this close to 0, 1 or -1 are taken as that, and cost nothing.
 _ROUNDING = 1e-15
 

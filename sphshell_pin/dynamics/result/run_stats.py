@@ -8,11 +8,20 @@ from typing import ClassVar, Literal
 
 from sphshell_pin.base.summary import Fact, Summarized
 
-_OfPair = Literal["touch", "lift_off", "deep", "through", "beyond_hertz"]
-_AtStop = Literal["stop", "stop_left"]
-_AtLimit = Literal["effort_limit", "effort_limit_left", "speed_limit", "speed_limit_left"]
-EventKind = Literal[_OfPair, _AtStop, _AtLimit]
-"""Kinds of events in the order of the compiled core; those at stops and limits are of joints."""
+# Kinds of events in the order of the compiled core; from "stop" on, of joints.
+EventKind = Literal[
+    "touch",
+    "lift_off",
+    "deep",
+    "through",
+    "beyond_hertz",
+    "stop",
+    "stop_left",
+    "effort_limit",
+    "effort_limit_left",
+    "speed_limit",
+    "speed_limit_left",
+]
 
 
 @dataclass(frozen=True)

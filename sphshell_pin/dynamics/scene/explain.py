@@ -168,8 +168,14 @@ def _recommended_dt(shortest: float) -> float:
 
 
 # What a model may state of its joints, as a reader calls it.
-_JOINT_KINDS = {"limits": "position limits", "effort": "effort limits", "speed": "speed limits"}
-_JOINT_KINDS |= {"damping": "damping", "friction": "dry friction", "armature": "armature"}
+_JOINT_KINDS = {
+    "limits": "position limits",
+    "damping": "damping",
+    "friction": "dry friction",
+    "armature": "armature",
+    "effort": "effort limits",
+    "speed": "speed limits",
+}
 
 
 def _joints_modelled(scene: Scene) -> list[str]:

@@ -14,9 +14,14 @@ from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 
-PLACES = {"below": (0.0, 0.0, -1.0), "above": (0.0, 0.0, 1.0)}
-PLACES |= {"+x": (1.0, 0.0, 0.0), "-x": (-1.0, 0.0, 0.0)}
-PLACES |= {"+y": (0.0, 1.0, 0.0), "-y": (0.0, -1.0, 0.0)}
+PLACES: dict[str, tuple[float, float, float]] = {
+    "below": (0.0, 0.0, -1.0),
+    "above": (0.0, 0.0, 1.0),
+    "+x": (1.0, 0.0, 0.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "+y": (0.0, 1.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+}
 """Where the surface is placed, seen from the tip."""
 
 WORDS = ("plane", "box", "sphere", "cylinder", "bowl")

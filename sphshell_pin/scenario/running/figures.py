@@ -15,17 +15,40 @@ from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ScenarioError, add_origin
 from sphshell_pin.scenario.format.build import Built
 
-PAIR_FIGURES = {"contact_time": "s", "touches": "", "peak_force": "N", "mean_force": "N"}
-PAIR_FIGURES |= {"max_depth": "m", "max_depth_time": "s", "impulse": "N s", "peak_force_time": "s"}
-JOINT_FIGURES = {"stop_time": "s", "stops": "", "stop_impulse": "N m s", "peak_stop_force": "N m"}
-JOINT_FIGURES |= {"max_stop_depth": "rad", "cut_time": "s", "peak_speed": "rad/s"}
+PAIR_FIGURES = {
+    "contact_time": "s",
+    "touches": "",
+    "peak_force": "N",
+    "mean_force": "N",
+    "max_depth": "m",
+    "max_depth_time": "s",
+    "impulse": "N s",
+    "peak_force_time": "s",
+}
+JOINT_FIGURES = {
+    "stop_time": "s",
+    "stops": "",
+    "stop_impulse": "N m s",
+    "peak_stop_force": "N m",
+    "max_stop_depth": "rad",
+    "cut_time": "s",
+    "peak_speed": "rad/s",
+}
 _SLIDING = {"N m s": "N s", "N m": "N", "rad": "m", "rad/s": "m/s"}
 """Units of a joint that slides, by those of one that turns."""
 SENSOR_FIGURES = ("min", "max", "mean", "last")
 """Figures of each value of a sensor's readings, in the unit of its column."""
-RUN_FIGURES = {"energy.exchanged": "J", "energy.residual": "J", "energy.relative_residual": ""}
-RUN_FIGURES |= {"stats.real_time_factor": "", "stats.steps": "", "stats.duration": "s"}
-RUN_FIGURES |= {"stats.rejected": "", "stats.evaluations": "", "stats.dt": "s"}
+RUN_FIGURES = {
+    "energy.exchanged": "J",
+    "energy.residual": "J",
+    "energy.relative_residual": "",
+    "stats.real_time_factor": "",
+    "stats.steps": "",
+    "stats.duration": "s",
+    "stats.rejected": "",
+    "stats.evaluations": "",
+    "stats.dt": "s",
+}
 NOT_REPEATABLE = ("stats.real_time_factor",)
 """Figures that are no property of the motion: they differ from one time to the next."""
 

@@ -115,8 +115,12 @@ class Rows:
 
 
 # Units of charts, as people read them: the factor from SI units, and the name.
-_SHOWN = {"rad": (180.0 / np.pi, "deg"), "rad/s": (180.0 / np.pi, "deg/s")}
-_SHOWN |= {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+_SHOWN = {
+    "rad": (180.0 / np.pi, "deg"),
+    "rad/s": (180.0 / np.pi, "deg/s"),
+    "m": (1e3, "mm"),
+    "m/s": (1e3, "mm/s"),
+}
 _TORQUES = {"rad/s": "N m", "m/s": "N"}
 
 

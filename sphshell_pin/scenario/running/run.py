@@ -31,8 +31,17 @@ STOPPED = "-stopped"
 """Ends the name of the folder for what stopped early, beside that of complete results."""
 
 # What a run writes: a later one replaces all of it, so that no folder mixes two runs.
-RESULTS: tuple[str, ...] = ("run.npz", "contacts.csv", "sensors.csv", SUMMARY)
-RESULTS += ("force_and_depth.png", "energy.png", "contact_map.png", "sensors.png", RECORDING)
+RESULTS = (
+    "run.npz",
+    "contacts.csv",
+    "sensors.csv",
+    SUMMARY,
+    "force_and_depth.png",
+    "energy.png",
+    "contact_map.png",
+    "sensors.png",
+    RECORDING,
+)
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,19 @@ import io
 import pickle
 from typing import Any
 
-_MADE_BY = {f"builtins.{kind}Warning" for kind in ("User", "Deprecation", "Runtime")}
-_MADE_BY |= {f"numpy.core.multiarray.{name}" for name in ("_reconstruct", "scalar")}
-_MADE_BY |= {"numpy.core.numeric._frombuffer", "numpy.dtype", "numpy.ndarray"}
-_MADE_BY |= {"pathlib.PosixPath", "pathlib._local.PosixPath", "sphshell_pin.errors._again"}
+_MADE_BY = {
+    "builtins.UserWarning",
+    "builtins.DeprecationWarning",
+    "builtins.RuntimeWarning",
+    "numpy.core.multiarray._reconstruct",
+    "numpy.core.multiarray.scalar",
+    "numpy.core.numeric._frombuffer",
+    "numpy.dtype",
+    "numpy.ndarray",
+    "pathlib.PosixPath",
+    "pathlib._local.PosixPath",
+    "sphshell_pin.errors._again",
+}
 _DIGEST = hashlib.blake2b().digest_size
 
 

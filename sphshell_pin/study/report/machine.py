@@ -12,8 +12,18 @@ BUSY = 0.5
 """Load before the measurements from which on a report says that the machine was busy."""
 
 # Distributions whose speed shows on the page, in its order; others are left out.
-PACKAGES = ["sphshell-pin", "pin", "coal", "numpy", "trimesh"]
-PACKAGES += ["libigl", "fcpw", "mujoco", "drake", "pybullet"]
+PACKAGES = (
+    "sphshell-pin",
+    "pin",
+    "coal",
+    "numpy",
+    "trimesh",
+    "libigl",
+    "fcpw",
+    "mujoco",
+    "drake",
+    "pybullet",
+)
 
 
 def caution_of(load: float) -> str:
