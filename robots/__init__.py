@@ -4,6 +4,7 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -97,21 +98,13 @@ def load(
     RobotError
         Its description cannot be read on this machine (an SDF file, for one).
     """
+    load_named = partial(load_file, name=name, mimic=mimic, pose=pose)
     if name in OWN:
-        file = URDF_FOLDER / f"{name}.urdf"
         free = OWN[name] if free_flyer is None else free_flyer
-        return load_file(file, free_flyer=free, name=name, mimic=mimic, pose=pose)
+        return load_named(URDF_FOLDER / f"{name}.urdf", free_flyer=free)
     if is_library_name(name):
-        source = library_source(name)
-        return load_file(
-            source.file,
-            source.folders,
-            free_flyer=free_flyer,
-            mimic=mimic,
-            name=name,
-            xacro_args=source.xacro_args,
-            pose=pose,
-        )
+        file, folders, xacro_args = library_source(name)
+        return load_named(file, folders, free_flyer=free_flyer, xacro_args=xacro_args)
     try:
         import example_robot_data
     except ImportError:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 
 from sphshell_pin.base.regular_file import StrPath, open_regular
 from sphshell_pin.errors import SphshellError
@@ -17,8 +18,7 @@ from sphshell_pin.robots.packages import NAMED_ROBOT
 _PACKAGE = "robot_descriptions"
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """Where a robot's file is, with the folders of its packages and arguments of a xacro."""
 
     file: Path

@@ -5,9 +5,8 @@ The package registers them in `base/upward.py`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,46 +17,40 @@ if TYPE_CHECKING:
 
 
 class UpperLayers:
-    """Each property is a function, imported at its first use."""
+    """Each method imports what it calls when it is called."""
 
-    @property
-    def plot_result(self) -> Callable[[Result, str, Scene | None], Figure]:
+    def plot_result(self, result: Result, kind: str, scene: Scene | None) -> Figure:
         """`Result.plot`."""
         from sphshell_pin.plot import plot_result
 
-        return plot_result
+        return plot_result(result, kind, scene)
 
-    @property
-    def save_figures(self) -> Callable[..., list[Path]]:
+    def save_figures(self, *arguments: Any) -> list[Path]:
         """`Result.save_figures`."""
         from sphshell_pin.plot import save_figures
 
-        return save_figures
+        return save_figures(*arguments)
 
-    @property
-    def view_result(self) -> Callable[..., RecordingView]:
+    def view_result(self, *arguments: Any, **options: Any) -> RecordingView:
         """`Result.view`."""
         from sphshell_pin.view.recording import view_result
 
-        return view_result
+        return view_result(*arguments, **options)
 
-    @property
-    def render_film(self) -> Callable[..., Path]:
+    def render_film(self, *arguments: Any, **options: Any) -> Path:
         """`Result.render`."""
         from sphshell_pin.view.film import render_film
 
-        return render_film
+        return render_film(*arguments, **options)
 
-    @property
-    def write_mcap(self) -> Callable[..., Path]:
+    def write_mcap(self, *arguments: Any, **options: Any) -> Path:
         """`Result.to_mcap`."""
         from sphshell_pin.export.mcap import write_mcap
 
-        return write_mcap
+        return write_mcap(*arguments, **options)
 
-    @property
-    def rebuild_scene(self) -> Callable[[Result], Scene]:
-        """Returns the scene of the scenario that a result came from."""
+    def rebuild_scene(self, result: Result) -> Scene:
+        """Return the scene of the scenario that a result came from."""
         from sphshell_pin.scenario.running.replay import Replay
 
-        return lambda result: Replay(result).scene
+        return Replay(result).scene

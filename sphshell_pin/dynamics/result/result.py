@@ -242,7 +242,7 @@ class Result(Summarized):
 
     def save_figures(self, folder: StrPath, scene: Scene | None = None) -> list[Path]:
         """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
-        return upward.layers.save_figures(self, folder, scene=scene)
+        return upward.layers.save_figures(self, folder, scene)
 
     def view(
         self,
