@@ -5,8 +5,9 @@ The package registers them in `base/upward.py`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,40 +18,46 @@ if TYPE_CHECKING:
 
 
 class UpperLayers:
-    """Each method imports what it calls when it is called."""
+    """Each property is a function, imported at its first use."""
 
-    def plot_result(self, result: Result, kind: str, scene: Scene | None) -> Figure:
+    @property
+    def plot_result(self) -> Callable[[Result, str, Scene | None], Figure]:
         """`Result.plot`."""
         from sphshell_pin.plot import plot_result
 
-        return plot_result(result, kind, scene)
+        return plot_result
 
-    def save_figures(self, *arguments: Any) -> list[Path]:
+    @property
+    def save_figures(self) -> Callable[..., list[Path]]:
         """`Result.save_figures`."""
         from sphshell_pin.plot import save_figures
 
-        return save_figures(*arguments)
+        return save_figures
 
-    def view_result(self, *arguments: Any, **options: Any) -> RecordingView:
+    @property
+    def view_result(self) -> Callable[..., RecordingView]:
         """`Result.view`."""
         from sphshell_pin.view.recording import view_result
 
-        return view_result(*arguments, **options)
+        return view_result
 
-    def render_film(self, *arguments: Any, **options: Any) -> Path:
+    @property
+    def render_film(self) -> Callable[..., Path]:
         """`Result.render`."""
         from sphshell_pin.view.film import render_film
 
-        return render_film(*arguments, **options)
+        return render_film
 
-    def write_mcap(self, *arguments: Any, **options: Any) -> Path:
+    @property
+    def write_mcap(self) -> Callable[..., Path]:
         """`Result.to_mcap`."""
         from sphshell_pin.export.mcap import write_mcap
 
-        return write_mcap(*arguments, **options)
+        return write_mcap
 
-    def rebuild_scene(self, result: Result) -> Scene:
-        """Return the scene of the scenario that a result came from."""
+    @property
+    def rebuild_scene(self) -> Callable[[Result], Scene]:
+        """Returns the scene of the scenario that a result came from."""
         from sphshell_pin.scenario.running.replay import Replay
 
-        return Replay(result).scene
+        return lambda result: Replay(result).scene

@@ -246,8 +246,7 @@ class ShellTaxels:
         pairs = [k for k in alike if not has_foundation(scene.pairs[k])]
         patches = patches_on(result, scene, pairs, pair.joint_j, pair.placement_j)
         corners = np.asarray(shell.vertices, dtype=float)[np.asarray(shell.triangles)]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals = shell.triangle_normals
         low, high = corners.min(axis=1), corners.max(axis=1)
         forces, outside = np.zeros((len(result.t), count)), np.zeros(len(result.t))
         for k, row in enumerate(patches.row):

@@ -263,7 +263,7 @@ def _launch(driver: Playwright, path: Path) -> Browser:
 
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)
     # Within its own sandbox Chromium does not start for root, as in a container.
-    flags = [*FLAGS, *(["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else [])]
+    flags = [*FLAGS, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     try:
         return driver.chromium.launch(executable_path=program, args=flags, handle_sigint=False)
     except Error as fault:

@@ -6,7 +6,6 @@ anything: sizes are compared before memory is taken, nothing is ever unpickled.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -172,10 +171,8 @@ def _origin_in_file(origin: result_parts.Origin, home: Path) -> dict[str, object
         return {"scenario": scenario, "settings": settings}
     # Results and scenario may move together, or the results alone: both paths are written.
     path = os.path.abspath(scenario)
-    # Another drive has no relative path.
-    with contextlib.suppress(ValueError):
-        scenario = Path(os.path.relpath(path, home.absolute())).as_posix()
-    return {"scenario": scenario, "settings": settings, "path": path}
+    near = os.path.relpath(path, home.absolute())
+    return {"scenario": near, "settings": settings, "path": path}
 
 
 def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:

@@ -243,11 +243,8 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
 
 
 def _relative(file: Path, path: Path) -> str:
-    """Return `file` relative to the scenario at `path`; absolute where that cannot be."""
-    try:
-        return Path(os.path.relpath(file, path.parent)).as_posix()
-    except ValueError:  # another drive
-        return file.absolute().as_posix()
+    """Return `file` relative to the scenario at `path`."""
+    return os.path.relpath(file, path.parent)
 
 
 def _build_bare(

@@ -157,6 +157,6 @@ def open_file(path: Path) -> None:
 
 
 def _on_a_screen() -> bool:
-    return sys.platform in ("darwin", "win32") or any(
+    return sys.platform == "darwin" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
