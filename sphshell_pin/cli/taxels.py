@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from sphshell_pin.cli.common import RunArgument, command, echo, if_installed
+from sphshell_pin.cli.common import command, echo, if_installed
 from sphshell_pin.cli.export import file_of
 
 SHOWN = 5
@@ -12,7 +12,7 @@ SHOWN = 5
 
 @command()
 def taxels(
-    run: RunArgument,
+    run: Path,
     *,
     contact: str,
     shape: tuple[int, int] = (16, 16),

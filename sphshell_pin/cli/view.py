@@ -11,8 +11,8 @@ from sphshell_pin.errors import InvalidParameter, SphshellError
 def view(
     scenario: str,
     *,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
     speed: float | None = None,
     paused: bool = False,
     host: str = "127.0.0.1",
@@ -84,7 +84,7 @@ def _play(file: Path, speed: float | None, color: str, *, open_: bool) -> None:
 
 @common.command()
 def render(
-    run: common.RunArgument,
+    run: Path,
     *,
     out: Path,
     time: float | None = None,

@@ -15,6 +15,7 @@ from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.inertia import lacks_masses, mass_fault
 from sphshell_pin.shell import Shell
+from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.robot_check import probe_spheres
 from sphshell_pin.study.robot_check.models import Subject, listed
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
@@ -101,14 +102,9 @@ def setting_of(
 
 def patch(radius: float) -> Shell:
     """Return a wavy patch (800 triangles, exact normals) round the origin, z up, for `radius`."""
-    at = np.linspace(-_HALF, _HALF, _CELLS + 1) * radius
-    x, y = (one.ravel() for one in np.meshgrid(at, at, indexing="ij"))
+    vertices, triangles = wavy_sheet(_CELLS, 2.0 * _HALF * radius)
+    x, y, _ = vertices.T
     z, normals = _wave(x, y, radius)
-    number = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
-    a, b, c, d = (
-        one.ravel() for one in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
-    )
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return Shell(np.stack([x, y, z], 1), triangles, normals=normals, name="patch")
 
 
