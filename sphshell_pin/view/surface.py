@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import (
     IntArray,
     Json,
@@ -23,16 +22,6 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
     from sphshell_pin.shell.shell import Shell
-
-Coloring = Literal["surface", "faces"]
-"""What the colors of shells can show."""
-
-
-def check_coloring(color: str) -> None:
-    """Raise InvalidParameter unless `color` is a Coloring."""
-    if color not in get_args(Coloring):
-        raise InvalidParameter("color", color, f"must be one of {', '.join(get_args(Coloring))}")
-
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E

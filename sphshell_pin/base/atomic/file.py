@@ -121,6 +121,22 @@ def write_whole(path: StrPath, data: bytes) -> Path:
     return path
 
 
+def check_writable(path: Path) -> None:
+    """Raise ResultError unless a file can be written to `path`, in a folder that is made for it.
+
+    It is asked before minutes go into the file's content.
+    """
+    trial = path.with_name(f".{path.name}.try")
+    if path.is_dir():
+        raise ResultError(path, "is a folder: give the name of a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trial.touch()
+        trial.unlink()
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written: {fault.strerror}") from None
+
+
 @contextlib.contextmanager
 def _aside(path: StrPath, suffix: str) -> Iterator[tuple[IO[bytes], Path]]:
     target = Path(os.path.realpath(path))
