@@ -246,23 +246,20 @@ def parsed(text: bytes) -> ET.Element:
     for link in root.iter("link"):
         for part in (*link.findall("inertial/*"), *link.findall("collision//*")):
             for name in _COUNTS.keys() & part.attrib.keys() if part.tag in _PARTS else ():
-                where = f"the {part.tag} of link '{link.get('name')}' has {name} = '{{}}', which"
+                where = f"the {part.tag} of link '{link.get('name')}': {name}"
                 part.set(name, _numbers(part.attrib[name], _COUNTS[name], where))
     return root
 
 
 def _numbers(text: str, count: int, where: str) -> str:
-    """Return numbers as Python writes them; ValueError unless they are `count` finite ones.
-
-    `where` begins the error, with {} for the text.
-    """
+    """Return `count` finite numbers as Python writes them; `where` begins the error of others."""
     try:
         numbers = [number_of(word) for word in text.split()]
     except ValueError:
         numbers = []
     if len(numbers) != count:
         must = f"must be {count} finite number{'s' * (count > 1)}"
-        raise ValueError(f"{where.format(text)} {must}")
+        raise ValueError(f"{where} '{text}' {must}")
     return " ".join(map(repr, numbers))
 
 
@@ -296,7 +293,7 @@ def check_poses(root: ET.Element, model: pin.Model) -> None:
                 raise ValueError(
                     f"{where}: the robot has no such joint; correct the name or leave it out"
                 )
-            one.set("value", _numbers(value, count, f"{where}: value '{{}}'"))
+            one.set("value", _numbers(value, count, f"{where}: value"))
 
 
 def check_size(text: bytes) -> str:

@@ -83,21 +83,20 @@ def setting_of(
             f"dynamics has no answer for them: {listed(held)}"
         )
     try:
-        tip, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
-        sphere, shifted = probe_spheres.moved_sphere(model, tip, rng)
+        sphere, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
     except SphshellError:
         robot = subject.robot
         fault = mass_fault(robot.model, postures[0], robot.description) if held else None
         if fault is None:
             raise
         raise SphshellError(fault) from None
-    notes += said + shifted
+    notes += said
     if any(model.armature[one.idx_v] for one in model.joints if _flies(one)):
         notes.append(
             "the file gives its free joint an armature, an inertia without momentum, which is left "
             "out where momentum is checked: make it a <freejoint/>, which takes no defaults"
         )
-    return Setting(model, sphere, patch(tip.radius), tuple(notes))
+    return Setting(model, sphere, patch(sphere.radius), tuple(notes))
 
 
 def patch(radius: float) -> Shell:
