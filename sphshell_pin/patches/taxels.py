@@ -14,7 +14,6 @@ from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of
-from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
@@ -242,7 +241,9 @@ class ShellTaxels:
                 raise ResultError(f"shell '{shell.name}'", "has no CAD faces: take its elements")
             owner = np.asarray(shell.element_face, dtype=np.int64)[owner]
             count = len(shell.face_names)
-        alike = same_shell(scene, pair)
+        # All pairs that have the shell in the same place.
+        keys = [one.key for one in pair.shells]
+        alike = [k for k, one in enumerate(scene.pairs) if [s.key for s in one.shells] == keys]
         pairs = [k for k in alike if not has_foundation(scene.pairs[k])]
         patches = patches_on(result, scene, pairs, pair.joint_j, pair.placement_j)
         corners = np.asarray(shell.vertices, dtype=float)[np.asarray(shell.triangles)]
@@ -265,9 +266,3 @@ class ShellTaxels:
                 np.add.at(forces[row], owner[triangles], loads)
                 outside[row] += force - loads.sum()
         return TaxelImages(result.t, read_only(forces), read_only(outside))
-
-
-def same_shell(scene: Scene, pair: ContactPair) -> list[int]:
-    """Return the numbers of the pairs that have the shell of `pair` in the same place."""
-    keys = [one.key for one in pair.shells]
-    return [k for k, other in enumerate(scene.pairs) if [one.key for one in other.shells] == keys]

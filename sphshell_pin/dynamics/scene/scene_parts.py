@@ -281,10 +281,6 @@ class SceneParts(Summarized):
             effects.use(self._robot)
         return effects
 
-    def shares_model(self, other: SceneParts) -> bool:
-        """Whether both scenes have one model, as those that `with_pairs` makes."""
-        return self._model is other._model
-
     def _check_unchanged(self) -> None:
         """Raise InvalidParameter if somebody has changed the model that they got of this scene."""
         if self._shown is not None:

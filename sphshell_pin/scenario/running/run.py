@@ -127,7 +127,9 @@ def run_built(
                 notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
             place.replace(staging, RESULTS)
         except OSError as error:
-            raise _not_written(folder, error) from None
+            cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+            reason = f"the results cannot be written: {cause.strerror or cause}"
+            raise errors.ResultError(folder, reason) from None
     if fault is not None:
         raise fault
     if interrupted:
@@ -194,11 +196,6 @@ def origin_of(built: Built) -> Origin:
         {key: plain(value) for key, value in settings},
         partial(keep, built.scenario, folder, built.assembly.loaded, dict(built.shells)),
     )
-
-
-def _not_written(folder: Path, error: OSError) -> errors.ResultError:
-    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
-    return errors.ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
 
 
 def _holds_complete(folder: Path) -> bool:

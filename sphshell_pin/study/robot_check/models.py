@@ -139,9 +139,3 @@ def _without_meshes(
     )
     robot = robots.exactly(robot, description, mimic=mimic, warn=False)
     return Subject(name, robot, shipped, robot.notes)
-
-
-def listed(names: list[str], most: int = 4) -> str:
-    """Return the names in quotes; of more than `most` the first, and how many there are."""
-    text = ", ".join(f"'{name}'" for name in names[:most])
-    return f"{text}, ... ({len(names)} of them)" if len(names) > most else text

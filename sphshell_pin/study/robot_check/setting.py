@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, frame_along
+from sphshell_pin.base.summary import names
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
@@ -17,7 +18,7 @@ from sphshell_pin.robots.inertia import lacks_masses, mass_fault
 from sphshell_pin.shell import Shell
 from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.robot_check import probe_spheres
-from sphshell_pin.study.robot_check.models import Subject, listed
+from sphshell_pin.study.robot_check.models import Subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.testing.forces import point_jacobian
 
@@ -80,7 +81,7 @@ def setting_of(
         model = Scene(model, lock=held, q_lock=postures[0]).model
         notes.append(
             "joints that move no mass are held here, as `lock` does it in a scene, because forward "
-            f"dynamics has no answer for them: {listed(held)}"
+            f"dynamics has no answer for them: {names(held)}"
         )
     try:
         sphere, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
