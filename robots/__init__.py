@@ -4,14 +4,14 @@ import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from os import PathLike
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_bytes, why_no_file
 from sphshell_pin.contact.sphere import Sphere
 from sphshell_pin.dynamics.scene.mimic import Mimic, shortened, with_mimics
 from sphshell_pin.errors import MissingExtra, NameNotFound, RobotWarning, SphshellError
@@ -35,12 +35,7 @@ _AT_ORIGIN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)  # of a root that floats
 URDF_FOLDER = Path(__file__).parent / "urdf"
 
 # Own robots, and whether their root floats freely.
-OWN: dict[str, bool] = {
-    "ball": True,
-    "gear_pair": False,
-    "three_link_finger": False,
-    "turntable": False,
-}
+OWN = {"ball": True, "gear_pair": False, "three_link_finger": False, "turntable": False}
 
 # Fingertips of robots whose collision geometry has no spheres: frame, radius [m], offset [m].
 TIPS: dict[str, tuple[tuple[str, float, tuple[float, float, float]], ...]] = {
@@ -103,21 +98,13 @@ def load(
     RobotError
         Its description cannot be read on this machine (an SDF file, for one).
     """
+    load_named = partial(load_file, name=name, mimic=mimic, pose=pose)
     if name in OWN:
-        file = URDF_FOLDER / f"{name}.urdf"
         free = OWN[name] if free_flyer is None else free_flyer
-        return load_file(file, free_flyer=free, name=name, mimic=mimic, pose=pose)
+        return load_named(URDF_FOLDER / f"{name}.urdf", free_flyer=free)
     if is_library_name(name):
-        source = library_source(name)
-        return load_file(
-            source.file,
-            source.folders,
-            free_flyer=free_flyer,
-            mimic=mimic,
-            name=name,
-            xacro_args=source.xacro_args,
-            pose=pose,
-        )
+        file, folders, xacro_args = library_source(name)
+        return load_named(file, folders, free_flyer=free_flyer, xacro_args=xacro_args)
     try:
         import example_robot_data
     except ImportError:
@@ -147,14 +134,14 @@ def load(
 
 
 def load_file(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
+    path: StrPath,
+    package_dirs: Iterable[StrPath] = (),
     *,
     free_flyer: bool | None = None,
     mimic: bool = False,
     name: str | None = None,
     xacro_args: Mapping[str, object] | None = None,
-    srdf: str | PathLike[str] | None = None,
+    srdf: StrPath | None = None,
     pose: str | None = None,
     density: float | None = None,
 ) -> LoadedRobot:
@@ -299,7 +286,7 @@ def _mimicking(robot: LoadedRobot, rules: Iterable[Mimic], what: str) -> LoadedR
     return replace(robot, model=model, q0=shortened(model, robot.q0))
 
 
-def _load_poses(model: pin.Model, srdf: str | PathLike[str] | None) -> None:
+def _load_poses(model: pin.Model, srdf: StrPath | None) -> None:
     if srdf is None:
         return
     if reason := why_no_file(srdf):

@@ -246,17 +246,21 @@ def parsed(text: bytes) -> ET.Element:
     for link in root.iter("link"):
         for part in (*link.findall("inertial/*"), *link.findall("collision//*")):
             for name in _COUNTS.keys() & part.attrib.keys() if part.tag in _PARTS else ():
-                value, count = part.attrib[name], _COUNTS[name]
-                try:
-                    numbers = [number_of(word) for word in value.split()]
-                except ValueError:
-                    numbers = []
-                if len(numbers) != count:
-                    must = f"must be {count} finite number{'s' * (count > 1)}"
-                    where = f"the {part.tag} of link '{link.get('name')}' has {name} = '{value}'"
-                    raise ValueError(f"{where}, which {must}")
-                part.set(name, " ".join(map(repr, numbers)))
+                where = f"the {part.tag} of link '{link.get('name')}': {name}"
+                part.set(name, _numbers(part.attrib[name], _COUNTS[name], where))
     return root
+
+
+def _numbers(text: str, count: int, where: str) -> str:
+    """Return `count` finite numbers as Python writes them; `where` begins the error of others."""
+    try:
+        numbers = [number_of(word) for word in text.split()]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        must = f"must be {count} finite number{'s' * (count > 1)}"
+        raise ValueError(f"{where} '{text}' {must}")
+    return " ".join(map(repr, numbers))
 
 
 def _declared(text: bytes) -> bytes:
@@ -289,15 +293,7 @@ def check_poses(root: ET.Element, model: pin.Model) -> None:
                 raise ValueError(
                     f"{where}: the robot has no such joint; correct the name or leave it out"
                 )
-            try:
-                values = [number_of(part) for part in value.split()]
-            except ValueError:
-                values = []
-            if len(values) != count:
-                raise ValueError(
-                    f"{where}: value '{value}' must be {count} finite number{'s' * (count > 1)}"
-                )
-            one.set("value", " ".join(map(repr, values)))
+            one.set("value", _numbers(value, count, f"{where}: value"))
 
 
 def check_size(text: bytes) -> str:

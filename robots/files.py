@@ -1,7 +1,5 @@
 """Robots' files of all formats: read into one description, then into Pinocchio's models."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import os
@@ -9,13 +7,12 @@ import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes, why_no_file
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_bytes, why_no_file
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
@@ -48,14 +45,7 @@ _REFUSED = {
     "robot's URDF or xacro, or convert it to MJCF (pip install sdformat-mjcf)",
     (".usd", ".usda", ".usdc", ".usdz"): "is a USD file, which pinocchio does not read: export "
     "a URDF or MJCF from the program that made it (Isaac Sim has an exporter to URDF)",
-    (
-        ".dae",
-        ".stl",
-        ".obj",
-        ".ply",
-        ".gltf",
-        ".glb",
-    ): "is a mesh, without joints and masses: "
+    (".dae", ".stl", ".obj", ".ply", ".gltf", ".glb"): "is a mesh, without joints and masses: "
     "write a URDF or MJCF with a link that names it; as a surface to touch it is a shell's file",
     (".step", ".stp", ".iges", ".igs", ".brep"): "is a CAD file, without joints and masses: "
     "export a URDF from the CAD program; as a surface to touch it is a shell's file",
@@ -71,8 +61,8 @@ _NEXT = "robots are read from URDF (.urdf), xacro (.xacro) and MJCF (.xml) files
 
 
 def read(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
+    path: StrPath,
+    package_dirs: Iterable[StrPath] = (),
     xacro_args: Mapping[str, object] | None = None,
     *,
     free_flyer: bool | None = None,
@@ -152,7 +142,7 @@ def _not_read(file: Path, tag: str, error: Exception) -> str:
     return f"not {kind} that can be read: {_line(error)}"
 
 
-def is_path(robot: str | PathLike[str]) -> bool:
+def is_path(robot: StrPath) -> bool:
     """Whether `robot` is meant as a file, not as a name."""
     known = (".urdf", ".xacro", ".xml", ".mjcf", *(one for ends in _REFUSED for one in ends))
     return Path(robot).suffix.lower() in known or "/" in str(robot) or os.path.isfile(robot)

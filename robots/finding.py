@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from os import PathLike
 from pathlib import Path
+from typing import NamedTuple
 
-from sphshell_pin.base.regular_file import open_regular
+from sphshell_pin.base.regular_file import StrPath, open_regular
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.files import RobotError, build_model, read
 from sphshell_pin.robots.inertia import mass_fault
@@ -18,8 +18,7 @@ from sphshell_pin.robots.packages import NAMED_ROBOT
 _PACKAGE = "robot_descriptions"
 
 
-@dataclass(frozen=True)
-class Source:
+class Source(NamedTuple):
     """Where a robot's file is, with the folders of its packages and arguments of a xacro."""
 
     file: Path
@@ -76,7 +75,7 @@ class FoundRobot:
     """A sentence; empty if nothing is."""
 
 
-def find_robots(folder: str | PathLike[str]) -> Iterator[FoundRobot]:
+def find_robots(folder: StrPath) -> Iterator[FoundRobot]:
     """Yield the robots of the URDF, xacro and MJCF files in `folder` and below."""
     for file in _candidates(Path(folder)):
         try:

@@ -4,10 +4,10 @@ import copy
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
-from os import PathLike
 
 import pinocchio as pin
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.robots.files import RobotError, build_geometry, build_model, read, unwound
 from sphshell_pin.robots.inertia import with_density
 
@@ -15,8 +15,8 @@ _DECLARED = re.compile(r"\{(urn:([\w.-]+))\}")
 
 
 def mended(
-    path: str | PathLike[str],
-    package_dirs: Iterable[str | PathLike[str]] = (),
+    path: StrPath,
+    package_dirs: Iterable[StrPath] = (),
     xacro_args: Mapping[str, object] | None = None,
     density: float | None = None,
 ) -> tuple[str, list[str]]:

@@ -11,11 +11,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import chain
-from os import PathLike
 from pathlib import Path
 from urllib.parse import unquote
 
-from sphshell_pin.base.regular_file import MOST_TEXT, read_bytes
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_bytes
 
 # Folders one within another below one of ROS_PACKAGE_PATH; a workspace has three.
 _DEEPEST = 5
@@ -41,7 +40,7 @@ class Folders:
     """Meshes of a description that is no file any more by name, the only files to read."""
 
     @classmethod
-    def of(cls, file: Path, given: Iterable[str | PathLike[str]] = ()) -> Folders:
+    def of(cls, file: Path, given: Iterable[StrPath] = ()) -> Folders:
         """Return those of `file`, with the folders `given` first."""
         return cls(file, tuple(Path(one).absolute() for one in given))
 

@@ -115,7 +115,7 @@ def test_a_diverged_run_says_where_its_part_is_and_spares_the_complete_one(run, 
     assert told.exit_code == 2
     assert "diverged at t =" in told.stderr
     assert "sphshell-pin explain" in told.stderr
-    assert f"partial results are in {out / 'stopped'}" in told.stderr
+    assert f"partial results are in {tmp_path / 'out-stopped'}" in told.stderr
     assert ".result" not in told.stderr
     assert (out / "run.npz").read_bytes() == before
 

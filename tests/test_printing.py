@@ -38,7 +38,6 @@ WORDS = {
     "sweep": "drop.toml --vary contact.ball-plate.law.stiffness=1e5:1e6:2 --workers 0 "
     "--no-pictures --out é.parquet",
     "fit": "drop.csv drop.toml --param gravity.2 --out é",
-    "taxels": "results --contact ball-plate --out é",
     "compare": "results results --no-picture --out é",
     "report": "--out é",
     "list": "",

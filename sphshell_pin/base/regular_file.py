@@ -9,6 +9,9 @@ import os
 import stat
 from os import PathLike
 
+StrPath = str | PathLike[str]
+"""What names a file."""
+
 MOST = 4e9
 """Most of a file, unless stated [bytes]."""
 
@@ -21,7 +24,7 @@ SMALL = 1 << 16
 _SPECIAL = "is a pipe, a socket or a device, not a file"
 
 
-def why_no_file(path: str | PathLike[str]) -> str:
+def why_no_file(path: StrPath) -> str:
     """Return what keeps `path` from being a regular file, as the end of a sentence, or ""."""
     try:
         mode = os.stat(path).st_mode
@@ -34,7 +37,7 @@ def why_no_file(path: str | PathLike[str]) -> str:
     return "" if stat.S_ISREG(mode) else _SPECIAL
 
 
-def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedReader:
+def open_regular(path: StrPath, most: float = MOST) -> io.BufferedReader:
     """Open a regular file of at most `most` bytes for reading.
 
     Raises OSError, whose `strerror` says what the file is instead.
@@ -59,13 +62,13 @@ def open_regular(path: str | PathLike[str], most: float = MOST) -> io.BufferedRe
     return file
 
 
-def read_bytes(path: str | PathLike[str], most: float = MOST) -> bytes:
+def read_bytes(path: StrPath, most: float = MOST) -> bytes:
     """Return the content of a file, see `open_regular`."""
     with open_regular(path, most) as file:
         return file.read(max(os.fstat(file.fileno()).st_size, SMALL))  # no more: it may grow
 
 
-def read_text(path: str | PathLike[str], most: float = MOST) -> str:
+def read_text(path: StrPath, most: float = MOST) -> str:
     """Return the text of a file in UTF-8, without its byte-order mark, lines ended as Python's."""
     with io.TextIOWrapper(io.BytesIO(read_bytes(path, most)), encoding="utf-8-sig") as text:
         return text.read()

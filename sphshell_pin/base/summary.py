@@ -47,12 +47,8 @@ class Summarized:
 
     def _facts(self) -> Iterable[Fact]:
         """Return what is worth knowing: here the fields of the dataclass."""
-        if not dataclasses.is_dataclass(self):
-            return []
-        values = (
-            (f.name.replace("_", " "), getattr(self, f.name)) for f in dataclasses.fields(self)
-        )
-        return [Fact(name, value) for name, value in values if value is not None]
+        values = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
+        return [Fact(k.replace("_", " "), one) for k, one in values.items() if one is not None]
 
     def __repr__(self) -> str:
         """Return what is worth knowing, with units."""

@@ -2,7 +2,7 @@
 
 # Imported for their commands, in the order of the help.
 # isort: off
-from sphshell_pin.cli import new, running, view, export, taxels, compare  # noqa: F401
+from sphshell_pin.cli import new, running, view, export, compare  # noqa: F401
 from sphshell_pin.cli import files, sweep, fit, report  # noqa: F401
 from sphshell_pin.cli import check_robot  # noqa: F401
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -24,12 +23,12 @@ def check_robot_(
     *,
     every: bool = False,
     frame: str | None = None,
-    radius: common.RadiusOption = None,
+    radius: str | None = None,
     free_flyer: bool = False,
-    package_dir: common.PackageDirOption = None,
-    xacro_arg: common.XacroArgOption = None,
-    density: common.DensityOption = None,
-    no_mimic: common.MimicOption = False,
+    package_dir: list[Path] | None = None,
+    xacro_arg: list[str] | None = None,
+    density: float | None = None,
+    no_mimic: bool = False,
     mend: Path | None = None,
     quick: bool = False,
     seed: Annotated[int, common.option("Seed of the random postures.", min=0)] = 0,
@@ -54,7 +53,7 @@ def check_robot_(
     quick : Fewer postures and runs.
     json FILE : Write all figures to this file.
     """
-    from sphshell_pin.base.atomic import write_whole
+    from sphshell_pin.base.atomic.file import check_writable, write_whole
     from sphshell_pin.study import robot_check as study
     from sphshell_pin.study.robot_check import models, report
 
@@ -68,7 +67,7 @@ def check_robot_(
         raise SphshellError("--mend writes one robot: give one")
     for path in (json, mend):
         if path is not None:
-            _check_writable(path)
+            check_writable(path)
     if mend is not None:
         from sphshell_pin.robots.mending import mended
 
@@ -107,16 +106,6 @@ def check_robot_(
     # no robot there is can be checked with.
     unread = report.NOT_CHECKED in verdicts and (not every or len(set(verdicts)) == 1)
     raise typer.Exit(common.MISSED if report.FAILED in verdicts else common.ERROR if unread else 0)
-
-
-def _check_writable(path: Path) -> None:
-    """Raise SphshellError if no file can be written there, before minutes go into its content."""
-    if not path.parent.is_dir():
-        raise SphshellError(f"{path}: there is no folder {path.parent} to write to")
-    if path.is_dir():
-        raise SphshellError(f"{path}: is a folder; give the name of a file in it")
-    if not os.access(path.parent, os.W_OK):
-        raise SphshellError(f"{path}: nothing may be written to the folder {path.parent}")
 
 
 def _check(

@@ -1,4 +1,24 @@
-"""The application: what every command shares. Heavy imports wait inside the commands."""
+"""The application: what every command shares. Heavy imports wait inside the commands.
+
+Options
+-------
+scenario : Name of a shipped scenario, or path of a .toml file.
+run : A finished run: its run.npz or results folder.
+set_ KEY=VALUE : Change a value; may be given several times.
+dt : Time step [s] in place of run.dt.
+duration : Time to simulate [s] in place of run.duration.
+compiled : Move the robot by code compiled for it, as robot.compiled = true.
+radius LENGTH : Of the sphere: 0.012 [m] or 12mm.
+package_dir FOLDER : Folder above the packages of the robot's meshes; may be given several times.
+density KG/M^3 : Of links whose mass the URDF does not state: from their meshes; 2700 is aluminium.
+no_mimic : Joints that mimic others move freely.
+xacro_arg NAME=VALUE : Argument of a xacro file, which is code; may be given several times.
+chord_error : Of CAD: largest distance of the elements from the exact surface [m].
+body NAME : Of CAD: take this body; may be given several times.
+face NAME : Of CAD: take this face, by name or number; may be given several times.
+time_limit : Of CAD: end OpenCASCADE after this time [s], 600 unless given.
+memory_limit : Of CAD: let OpenCASCADE take so much memory [bytes], 8e9 unless given.
+"""
 
 from __future__ import annotations
 
@@ -59,20 +79,8 @@ def argument(help: str, **more: Any) -> Any:
 # Exit codes: 1 an expectation was missed, 2 an error, 130 interrupted (as shells have it).
 MISSED, ERROR, INTERRUPTED = 1, 2, 130
 PERCENT = "{task.percentage:>3.0f} %"  # a column of progress_bar
-ScenarioArgument = Annotated[str, argument("Name of a shipped scenario, or path of a .toml file.")]
-SetOption = Annotated[
-    list[str] | None,
-    option("Change a value; may be given several times.", "--set", metavar="KEY=VALUE"),
-]
-DtOption = Annotated[float | None, option("Time step \\[s] in place of run.dt.")]
-CompiledOption = Annotated[
-    bool, option("Move the robot by code compiled for it, as robot.compiled = true.", "--compiled")
-]
-DurationOption = Annotated[float | None, option("Time to simulate \\[s] in place of run.duration.")]
-RadiusOption = Annotated[
-    str | None, option("Of the sphere: 0.012 \\[m] or 12mm.", metavar="LENGTH")
-]
-RunArgument = Annotated[Path, argument("A finished run: its run.npz or results folder.")]
+_SHARED = described(__doc__, "Options")[1]  # descriptions by name, see `command`
+_ARGUMENTS = {"scenario", "run"}  # wherever they stand in a signature
 
 
 def _search_in(folders: list[Path] | None) -> list[Path] | None:
@@ -85,33 +93,6 @@ def _search_in(folders: list[Path] | None) -> list[Path] | None:
     if folders:
         os.environ["ROS_PACKAGE_PATH"] = os.pathsep.join(every)
     return folders
-
-
-PackageDirOption = Annotated[
-    list[Path] | None,
-    option(
-        "Folder above the packages of the robot's meshes; may be given several times.",
-        "--package-dir",
-        metavar="FOLDER",
-        callback=_search_in,
-    ),
-]
-DensityOption = Annotated[
-    float | None,
-    option(
-        "Of links whose mass the URDF does not state: from their meshes; 2700 is aluminium.",
-        metavar="KG/M^3",
-    ),
-]
-MimicOption = Annotated[bool, option("Joints that mimic others move freely.", "--no-mimic")]
-XacroArgOption = Annotated[
-    list[str] | None,
-    option(
-        "Argument of a xacro file, which is code; may be given several times.",
-        "--xacro-arg",
-        metavar="NAME=VALUE",
-    ),
-]
 
 
 def _print_version(wanted: bool) -> None:
@@ -166,11 +147,13 @@ def command(name: str | None = None) -> Callable[[Callable[P, None]], Callable[P
     Parameters before `*` are arguments, those behind it options. The section "Options" at the end
     of the docstring describes each that is not annotated with its description: "name : help",
     where the name may be followed by other names of the option ("--all") and by what stands for its
-    value in the help ("FILE"). The rest of the docstring is the help of the command.
+    value in the help ("FILE"). What several commands share is described at the top of this module.
+    The rest of the docstring is the help of the command.
     """
 
     def add(function: Callable[P, None]) -> Callable[P, None]:
-        text, stated = described(function.__doc__, "Options")
+        text, own = described(function.__doc__, "Options")
+        stated = _SHARED | own
         signature = inspect.signature(function, eval_str=True)
         parameters = [
             _described(one, *stated[one.name]) if one.name in stated else one
@@ -196,12 +179,13 @@ def _described(parameter: inspect.Parameter, words: str, help: str) -> inspect.P
     names = [one for one in words.split() if one.startswith("--")]
     metavar = " ".join(one for one in words.split() if one not in names) or None
     help = help.replace("[", "\\[")
-    if parameter.kind is not parameter.KEYWORD_ONLY:
+    if parameter.kind is not parameter.KEYWORD_ONLY or parameter.name in _ARGUMENTS:
         made = argument(help, metavar=metavar)
     else:
         own = parameter.name.strip("_").replace("_", "-")
         usual = f"--{own}/--no-{own}" if parameter.default is True else f"--{own}"
-        made = option(help, *(names or [usual]), metavar=metavar)
+        callback = _search_in if parameter.name == "package_dir" else None
+        made = option(help, *(names or [usual]), metavar=metavar, callback=callback)
     return parameter.replace(annotation=Annotated[parameter.annotation, made])
 
 

@@ -81,10 +81,6 @@ def _print(first: str, other: Difference) -> None:
             common.say(f"{len(rows) - MOST_ROWS} more {title}s differ")
     same = len(other.figures) - len(figures), len(other.curves) - len(curves)
     common.say(f"equal to the last bit: {same[0]} figures, {same[1]} curves")
-    for label, names in ((first, other.only_first), (other.label, other.only_other)):
-        if names:
-            more = f" and {len(names) - MOST_ROWS} more" if len(names) > MOST_ROWS else ""
-            common.say(f"in {label} alone: {', '.join(names[:MOST_ROWS])}{more}")
 
 
 def _shown(value: object) -> str:

@@ -18,12 +18,7 @@ FORMATS = ("mcap", "csv", "parquet")
 
 
 @command()
-def export(
-    *,
-    run: common.RunArgument,
-    to: str | None = None,
-    out: Path | None = None,
-) -> None:
+def export(*, run: Path, to: str | None = None, out: Path | None = None) -> None:
     """Write a finished run as messages for Foxglove, RViz and Rerun, or as tables.
 
     An MCAP file has joint states, transforms, wrenches, contacts, energies and sensors as ROS 2

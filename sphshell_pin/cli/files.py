@@ -1,35 +1,9 @@
 """Commands on surface files."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated
 
 from sphshell_pin.cli import common
 from sphshell_pin.errors import SphshellError, UnitMissing
-
-ChordErrorOption = Annotated[
-    float | None,
-    common.option("Of CAD: largest distance of the elements from the exact surface \\[m]."),
-]
-BodyOption = Annotated[
-    list[str] | None,
-    common.option("Of CAD: take this body; may be given several times.", metavar="NAME"),
-]
-FaceOption = Annotated[
-    list[str] | None,
-    common.option(
-        "Of CAD: take this face, by name or number; may be given several times.", metavar="NAME"
-    ),
-]
-
-TimeLimitOption = Annotated[
-    float | None, common.option("Of CAD: end OpenCASCADE after this time \\[s], 600 unless given.")
-]
-MemoryLimitOption = Annotated[
-    float | None,
-    common.option("Of CAD: let OpenCASCADE take so much memory \\[bytes], 8e9 unless given."),
-]
 
 
 @common.command()
@@ -39,11 +13,11 @@ def check(
     unit: str | None = None,
     side: str = "both",
     scale: str | None = None,
-    chord_error: ChordErrorOption = None,
-    body: BodyOption = None,
-    face: FaceOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
+    chord_error: float | None = None,
+    body: list[str] | None = None,
+    face: list[str] | None = None,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> None:
     """Print the health of a surface file: what was found, what was repaired, how far it is curved.
 
@@ -83,11 +57,11 @@ def convert(
     *,
     unit_in: str | None = None,
     unit_out: str | None = None,
-    chord_error: ChordErrorOption = None,
-    body: BodyOption = None,
-    face: FaceOption = None,
-    time_limit: TimeLimitOption = None,
-    memory_limit: MemoryLimitOption = None,
+    chord_error: float | None = None,
+    body: list[str] | None = None,
+    face: list[str] | None = None,
+    time_limit: float | None = None,
+    memory_limit: float | None = None,
 ) -> None:
     """Write a surface file in another format, and measure how far apart the two are.
 

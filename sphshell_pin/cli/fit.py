@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 def fit(
     data: list[Path] | None = None,
     *,
-    scenario: common.ScenarioArgument,
+    scenario: str,
     param: list[str],
     experiment: list[str] | None = None,
     column: list[str] | None = None,
     out: Path | None = None,
     picture: bool = True,
-    compiled: common.CompiledOption = False,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    compiled: bool = False,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
 ) -> None:
     """Fit values of a scenario to measured data, and write the scenario with the fitted values.
 

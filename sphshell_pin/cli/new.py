@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, NoReturn
 
 from sphshell_pin.cli import common
-from sphshell_pin.cli.files import BodyOption, FaceOption, faces_of
+from sphshell_pin.cli.files import faces_of
 from sphshell_pin.errors import SphshellError, UnitMissing
 
 if TYPE_CHECKING:
@@ -23,11 +23,11 @@ def new(
     robot: str,
     surface: str = "plane",
     frame: str | None = None,
-    radius: common.RadiusOption = None,
+    radius: str | None = None,
     offset: tuple[float, float, float] | None = None,
     unit: str | None = None,
-    body: BodyOption = None,
-    face: FaceOption = None,
+    body: list[str] | None = None,
+    face: list[str] | None = None,
     law: str | None = None,
     against: str | None = None,
     press: float | None = None,
@@ -38,10 +38,10 @@ def new(
     tips: Literal["one", "all"] = "one",
     base: Literal["fixed", "floating"] | None = None,
     free_flyer: bool = False,
-    package_dir: common.PackageDirOption = None,
-    xacro_arg: common.XacroArgOption = None,
-    density: common.DensityOption = None,
-    no_mimic: common.MimicOption = False,
+    package_dir: list[Path] | None = None,
+    xacro_arg: list[str] | None = None,
+    density: float | None = None,
+    no_mimic: bool = False,
     out: Path | None = None,
     force: bool = False,
 ) -> None:

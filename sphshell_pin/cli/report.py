@@ -1,7 +1,5 @@
 """The command report: speed against error on this machine."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import typer

@@ -43,15 +43,15 @@ MOST_PAIRS = 16
 @common.command()
 def run(
     *,
-    scenario: common.ScenarioArgument,
+    scenario: str,
     out: Path | None = None,
-    dt: common.DtOption = None,
-    duration: common.DurationOption = None,
+    dt: float | None = None,
+    duration: float | None = None,
     recording: bool = True,
     figures: bool = True,
-    compiled: common.CompiledOption = False,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    compiled: bool = False,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
 ) -> None:
     """Run a scenario and write its results folder.
 
@@ -86,10 +86,11 @@ def run(
 
 @common.command()
 def explain(
-    scenario: common.ScenarioArgument,
-    dt: common.DtOption = None,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    *,
+    scenario: str,
+    dt: float | None = None,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
 ) -> None:
     """Say what a scenario models: time scales, expected depths, a fitting dt, warnings.
 

@@ -24,7 +24,7 @@ _MOST_FAILURES = 5
 @common.command()
 def sweep(
     *,
-    scenario: common.ScenarioArgument,
+    scenario: str,
     vary: list[str] | None = None,
     dist: list[str] | None = None,
     n: int | None = None,
@@ -35,11 +35,11 @@ def sweep(
     scheduler: str | None = None,
     plot: list[str] | None = None,
     pictures: bool = True,
-    dt: common.DtOption = None,
-    duration: common.DurationOption = None,
-    compiled: common.CompiledOption = False,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    dt: float | None = None,
+    duration: float | None = None,
+    compiled: bool = False,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
 ) -> None:
     """Run a scenario with many values, over processes or a Dask cluster; write one table.
 

@@ -11,14 +11,14 @@ from sphshell_pin.errors import InvalidParameter, SphshellError
 def view(
     scenario: str,
     *,
-    set_: common.SetOption = None,
-    package_dir: common.PackageDirOption = None,
+    set_: list[str] | None = None,
+    package_dir: list[Path] | None = None,
     speed: float | None = None,
     paused: bool = False,
     host: str = "127.0.0.1",
     port: int = 0,
     open_: bool = True,
-    color: str = "surface",
+    faces: bool = False,
 ) -> None:
     """Run a scenario in a page: pause, push, change parameters; or play a finished run.
 
@@ -35,7 +35,7 @@ def view(
     host : Address to serve the page at; 0.0.0.0 lets other machines in.
     port : Port of the page; 0 takes any that is free.
     open_ : Open the page in the web browser.
-    color : Colors of the shells: surface, or faces (by kind).
+    faces : Color the shells by the kinds of their faces.
     """
     from sphshell_pin.view import preview
     from sphshell_pin.view.live.opening import result_file
@@ -46,7 +46,7 @@ def view(
         if changes:
             key = next(iter(changes))
             raise InvalidParameter(key, changes[key], "cannot be changed: this is a finished run")
-        _play(finished, speed, color, open_=open_)
+        _play(finished, speed, faces=faces, open_=open_)
         return
     preview(
         scenario,
@@ -56,12 +56,12 @@ def view(
         host=host,
         port=port,
         open=open_,
-        color=color,  # type: ignore[arg-type]
+        faces=faces,
         told=lambda url: common.echo(f"{url}  (Ctrl-C ends the run)"),
     )
 
 
-def _play(file: Path, speed: float | None, color: str, *, open_: bool) -> None:
+def _play(file: Path, speed: float | None, *, faces: bool, open_: bool) -> None:
     """Write the recording of a finished run beside it, and open it."""
     from sphshell_pin.scenario.running.replay import Replay
     from sphshell_pin.view.live.opening import open_file
@@ -75,7 +75,7 @@ def _play(file: Path, speed: float | None, color: str, *, open_: bool) -> None:
         replay.visual_model,
         title=replay.title,
         speed=replay.speed if speed is None else speed,
-        color=color,
+        faces=faces,
     )
     common.echo(path)
     if open_:
@@ -84,7 +84,7 @@ def _play(file: Path, speed: float | None, color: str, *, open_: bool) -> None:
 
 @common.command()
 def render(
-    run: common.RunArgument,
+    run: Path,
     *,
     out: Path,
     time: float | None = None,

@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import itertools
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 
 from sphshell_pin.base.checks import check_vector
 from sphshell_pin.base.parameters import Component, parameter
-from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.regular_file import StrPath, read_text
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.errors import InvalidParameter
@@ -58,7 +57,7 @@ class TableLaw(NormalLaw, kind="table"):
             )
 
     @classmethod
-    def from_file(cls, path: str | PathLike[str]) -> TableLaw:
+    def from_file(cls, path: StrPath) -> TableLaw:
         """Read a csv file of two columns, depth [m] and force [N].
 
         A header and lines that start with # are left out. InvalidParameter for a file that cannot

@@ -84,14 +84,10 @@ def xyz(vector: Array) -> Message:
     return dict(zip("xyz", np.asarray(vector, dtype=float).tolist(), strict=True))
 
 
-def stamp_of(time: int) -> Message:
-    """Return the time [ns] as a message."""
-    return dict(zip(("sec", "nanosec"), divmod(time, 10**9), strict=True))
-
-
 def header(time: int, frame: str) -> Message:
     """Return the header of a message at a time [ns] in a frame."""
-    return {"stamp": stamp_of(time), "frame_id": frame}
+    stamp = dict(zip(("sec", "nanosec"), divmod(time, 10**9), strict=True))
+    return {"stamp": stamp, "frame_id": frame}
 
 
 def transform(time: int, parent: str, name: str, place: pin.SE3) -> Message:

@@ -5,7 +5,6 @@ import json
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import chain
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from sphshell_pin._versions import __version__
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_type
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import PairSeries
@@ -44,11 +44,7 @@ _TRANSFORMS, _WRENCH = "tf2_msgs/TFMessage", "geometry_msgs/WrenchStamped"
 
 
 def write_mcap(
-    path: str | PathLike[str],
-    result: Result,
-    scene: Scene | None = None,
-    *,
-    start: int = 0,
+    path: StrPath, result: Result, scene: Scene | None = None, *, start: int = 0
 ) -> Path:
     """Write `result` as an MCAP file; see `Result.to_mcap`."""
     mcap = import_extra("mcap_ros2.writer", "mcap", "Result.to_mcap", "mcap-ros2-support")

@@ -1,11 +1,11 @@
 """A result as a folder of tables: rows, contacts, events, energy and sensors."""
 
 import io
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 from sphshell_pin.base.atomic.files import write_folder
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.tables import Table, csv_text, write_parquet
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -28,11 +28,7 @@ def tables_of(result: Result, scene: Scene | None = None) -> dict[str, Table]:
 
 
 def write_tables(
-    folder: str | PathLike[str],
-    result: Result,
-    scene: Scene | None = None,
-    *,
-    format: Format = "csv",
+    folder: StrPath, result: Result, scene: Scene | None = None, *, format: Format = "csv"
 ) -> list[Path]:
     """Write the tables of `result` into `folder`, all or none; return the paths of the files.
 

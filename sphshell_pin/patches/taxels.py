@@ -1,7 +1,6 @@
 """Tactile sensors: what each cell of a grid on a sphere, or of a shell, feels of the patches."""
 
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
@@ -11,10 +10,10 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs, Mask
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_name, check_positive, check_vector, read_only
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Summarized
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import scene_of
-from sphshell_pin.dynamics.scene.pairs import ContactPair
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.patches.foundation import foundation_loads, has_foundation
@@ -44,7 +43,7 @@ class TaxelImages(Summarized):
     forces: Array
     outside: Array
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: StrPath) -> Path:
         """Write the arrays to a compressed .npz file, and return its path."""
         with atomic_file(Path(path)) as stream:
             np.savez_compressed(stream, t=self.t, forces=self.forces, outside=self.outside)
@@ -242,12 +241,13 @@ class ShellTaxels:
                 raise ResultError(f"shell '{shell.name}'", "has no CAD faces: take its elements")
             owner = np.asarray(shell.element_face, dtype=np.int64)[owner]
             count = len(shell.face_names)
-        alike = same_shell(scene, pair)
+        # All pairs that have the shell in the same place.
+        keys = [one.key for one in pair.shells]
+        alike = [k for k, one in enumerate(scene.pairs) if [s.key for s in one.shells] == keys]
         pairs = [k for k in alike if not has_foundation(scene.pairs[k])]
         patches = patches_on(result, scene, pairs, pair.joint_j, pair.placement_j)
         corners = np.asarray(shell.vertices, dtype=float)[np.asarray(shell.triangles)]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        normals = shell.triangle_normals
         low, high = corners.min(axis=1), corners.max(axis=1)
         forces, outside = np.zeros((len(result.t), count)), np.zeros(len(result.t))
         for k, row in enumerate(patches.row):
@@ -266,9 +266,3 @@ class ShellTaxels:
                 np.add.at(forces[row], owner[triangles], loads)
                 outside[row] += force - loads.sum()
         return TaxelImages(result.t, read_only(forces), read_only(outside))
-
-
-def same_shell(scene: Scene, pair: ContactPair) -> list[int]:
-    """Return the numbers of the pairs that have the shell of `pair` in the same place."""
-    keys = [one.key for one in pair.shells]
-    return [k for k, other in enumerate(scene.pairs) if [one.key for one in other.shells] == keys]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.base.checks import check_name
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.dynamics.result.result_scene import find_scene
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.plot.contact_map import plot_contact_map as plot_contact_map
@@ -20,8 +21,6 @@ from sphshell_pin.plot.over_time import plot_overview as plot_overview
 from sphshell_pin.plot.over_time import plot_sensors as plot_sensors
 
 if TYPE_CHECKING:
-    from os import PathLike
-
     from matplotlib.figure import Figure
 
     from sphshell_pin.dynamics.result.result import Result
@@ -54,9 +53,7 @@ def plot_result(result: Result, kind: str = "overview", scene: Scene | None = No
     return KINDS[kind](result, *([scene] if kind == "map" else []))
 
 
-def save_figures(
-    result: Result, folder: str | PathLike[str], scene: Scene | None = None
-) -> list[Path]:
+def save_figures(result: Result, folder: StrPath, scene: Scene | None = None) -> list[Path]:
     """Write the figures of `result` as .png files into `folder`; return their paths.
 
     They are force_and_depth, energy, of a result that touched a shell contact_map, and of one with

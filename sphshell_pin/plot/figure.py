@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import io
 import math
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from sphshell_pin.base.atomic import write_whole
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import import_extra
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def png(figure: Figure, dpi: int = RESOLUTION) -> bytes:
     return stream.getvalue()
 
 
-def write_figure(path: str | PathLike[str], figure: Figure) -> Path:
+def write_figure(path: StrPath, figure: Figure) -> Path:
     """Write `figure` as a .png file, whole or not at all; ResultError if it cannot be written."""
     return write_whole(path, png(figure))
 

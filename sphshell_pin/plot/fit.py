@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,8 +40,7 @@ def plot_fit(fit: Fit) -> Figure:
         _draw(axis, below, series)
     left = len(panels) - len(shown)
     more = f", {left} more columns are not drawn" if left else ""
-    name = fit.scenario.replace("\\", "/").rpartition("/")[2]
-    figure.suptitle(f"Fit of {name}: {len(fit.parameters)} parameters{more}")
+    figure.suptitle(f"Fit of {Path(fit.scenario).name}: {len(fit.parameters)} parameters{more}")
     return figure
 
 

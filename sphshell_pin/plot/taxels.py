@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.plot.figure import new_figure, reading_unit
 
@@ -27,7 +26,14 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
 
     Raises InvalidParameter unless the images are those of a grid, MissingExtra without matplotlib.
     """
-    forces = _grid(images)
+    forces = images.forces
+    if forces.ndim != 3:
+        raise InvalidParameter(
+            "images",
+            f"({', '.join(map(str, forces.shape))})",
+            "must be of a TaxelGrid: elements and faces have no order in a picture",
+            given="of shape",
+        )
     figure = new_figure(2.2 * len(rows) + 0.9, 2.7)
     factor, unit = reading_unit(float(forces[list(rows)].max()), "N")
     axes = np.atleast_1d(figure.subplots(1, len(rows)))
@@ -41,14 +47,3 @@ def plot_taxels(images: TaxelImages, rows: Sequence[int]) -> Figure:
         axis.set_yticks([])
     figure.colorbar(drawn, ax=list(axes), label=f"force on a taxel [{unit}]", shrink=0.8)
     return figure
-
-
-def _grid(images: TaxelImages) -> Array:
-    if images.forces.ndim != 3:
-        raise InvalidParameter(
-            "images",
-            f"({', '.join(map(str, images.forces.shape))})",
-            "must be of a TaxelGrid: elements and faces have no order in a picture",
-            given="of shape",
-        )
-    return images.forces

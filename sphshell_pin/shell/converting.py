@@ -1,8 +1,5 @@
 """From one surface file to another, and how far apart they are."""
 
-from __future__ import annotations
-
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base.atomic import atomic_path
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.readers import reader_for
 from sphshell_pin.shell.shell import Shell
@@ -42,8 +40,8 @@ class Conversion:
 
 
 def convert(
-    source: str | os.PathLike[str],
-    target: str | os.PathLike[str],
+    source: StrPath,
+    target: StrPath,
     unit_in: str | None = None,
     unit_out: str | None = None,
     *,

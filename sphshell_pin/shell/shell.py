@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sphshell_pin.base.checks import check_flag, check_positive, check_type
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Fact
 from sphshell_pin.errors import InvalidParameter, InvalidShell, UnitMissing, UnitWarning
 from sphshell_pin.shell.cad import CAD_SUFFIXES, CadOptions
@@ -35,11 +36,7 @@ Scale = str | float | None
 
 
 def load_surface(
-    path: str | os.PathLike[str],
-    unit: str | None,
-    scale: Scale,
-    cad: CadOptions,
-    crease_angle: float,
+    path: StrPath, unit: str | None, scale: Scale, cad: CadOptions, crease_angle: float
 ) -> Read:
     """Read and clean a surface file.
 
@@ -211,7 +208,7 @@ class Shell(Queries):
     @classmethod
     def from_file(
         cls,
-        path: str | os.PathLike[str],
+        path: StrPath,
         unit: str | None = None,
         scale: str | float | None = None,
         *,
@@ -354,7 +351,7 @@ class Shell(Queries):
             raise InvalidParameter("scale", scale, "makes the shell too large") from None
         return self.from_surface(surface, **self.options)
 
-    def to_file(self, path: str | os.PathLike[str], unit: str = "m") -> None:
+    def to_file(self, path: StrPath, unit: str = "m") -> None:
         """Write the shell in the format its suffix names: .shl, .stl, .obj, .ply, .off.
 
         The numbers are in `unit`; .shl files also carry it, as SCALE. Quads stay quads, except in

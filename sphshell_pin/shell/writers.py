@@ -3,9 +3,7 @@
 A file appears whole or not at all.
 """
 
-import os
 import struct
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array, Ints, Mask
 from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.base import ShellBase
 from sphshell_pin.shell.raw import area_vectors
@@ -48,7 +47,7 @@ class Written:
         ]
 
 
-def write_surface(path: str | os.PathLike[str], shell: ShellBase, unit: str) -> None:
+def write_surface(path: StrPath, shell: ShellBase, unit: str) -> None:
     """Write `shell` in the format the suffix names, see `Shell.to_file`."""
     path = Path(path)
     data = encoded(path, shell, unit)
@@ -184,11 +183,5 @@ def _ply(surface: Written) -> bytes:
     return _text(head + body + surface.rows(0))
 
 
-WRITERS: dict[str, Callable[[Written], bytes]] = {
-    ".shl": _shl,
-    ".stl": _stl,
-    ".obj": _obj,
-    ".ply": _ply,
-    ".off": _off,
-}
+WRITERS = {".shl": _shl, ".stl": _stl, ".obj": _obj, ".ply": _ply, ".off": _off}
 """Writers by suffix."""

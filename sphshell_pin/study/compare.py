@@ -77,15 +77,12 @@ class Difference:
     """One run beside the first: figures and curves of both, by name.
 
     `settings` are those of the scenarios that differ: key, of the first, of the other.
-    `only_first`, `only_other` are the curves that one alone has.
     """
 
     label: str
     figures: tuple[FigureDifference, ...]
     curves: tuple[CurveDifference, ...]
     settings: tuple[tuple[str, object, object], ...]
-    only_first: tuple[str, ...]
-    only_other: tuple[str, ...]
 
 
 def measured(label: str, result: Result, scene: Scene | None) -> Measured:
@@ -155,20 +152,15 @@ def _difference(first: Measured, other: Measured) -> Difference:
     settings = [(key, first.settings.get(key), other.settings.get(key)) for key in keys]
     curves = (_curve_difference(name, first.curves[name], other.curves[name]) for name in both)
     figures = []
-    for name, (value, unit) in first.figures.items():
-        if name in other.figures:
-            away = other.figures[name][0] - value
-            relative = away / abs(value) if value else math.nan
-            figures.append(
-                FigureDifference(name, unit, value, other.figures[name][0], away, relative)
-            )
+    for name in (one for one in first.figures if one in other.figures):
+        (a, unit), (b, _) = first.figures[name], other.figures[name]
+        relative = (b - a) / abs(a) if a else math.nan
+        figures.append(FigureDifference(name, unit, a, b, b - a, relative))
     return Difference(
         other.label,
         tuple(figures),
         tuple(one for one in curves if one is not None),
         tuple(one for one in settings if one[1] != one[2]),
-        tuple(name for name in first.curves if name not in both),
-        tuple(name for name in other.curves if name not in both),
     )
 
 

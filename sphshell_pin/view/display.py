@@ -38,18 +38,8 @@ TRAIL_COLOR = 0x8E1B8E
 
 Drawn = TypeVar("Drawn")
 
-Part = Literal[
-    "robot",
-    "spheres",
-    "arrows",
-    "points",
-    "wireframe",
-    "trails",
-    "curved",
-    "frames",
-    "grid",
-    "faces",
-]
+OfShells = Literal["wireframe", "trails", "curved", "faces"]
+Part = Literal["robot", "spheres", "arrows", "points", "frames", "grid", OfShells]
 PARTS: tuple[Part, ...] = get_args(Part)
 """What `Display.show` can show and hide.
 
@@ -57,7 +47,7 @@ PARTS: tuple[Part, ...] = get_args(Part)
 ones.
 """
 HIDDEN_AT_FIRST: frozenset[Part] = frozenset({"faces", "frames"})
-OF_SHELLS: frozenset[Part] = frozenset({"faces", "wireframe", "trails", "curved"})
+OF_SHELLS: frozenset[Part] = frozenset(get_args(OfShells))
 
 
 class Display:

@@ -14,7 +14,6 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -24,6 +23,7 @@ import pinocchio as pin
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_finite, check_vector
 from sphshell_pin.base.films import Pixels, write_film
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.dynamics.result.result_scene import sound_rows
 from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError
 from sphshell_pin.view.contact_path import LARGEST
@@ -46,7 +46,7 @@ PATIENCE = 120_000.0  # [ms] until the page is loaded
 
 
 def render_film(
-    path: str | PathLike[str],
+    path: StrPath,
     result: Result,
     scene: Scene | None = None,
     visual_model: pin.GeometryModel | None = None,
@@ -263,7 +263,7 @@ def _launch(driver: Playwright, path: Path) -> Browser:
 
     program = next(filter(None, map(shutil.which, PROGRAMS)), None)
     # Within its own sandbox Chromium does not start for root, as in a container.
-    flags = [*FLAGS, *(["--no-sandbox"] if getattr(os, "geteuid", lambda: 1)() == 0 else [])]
+    flags = [*FLAGS, *(["--no-sandbox"] if os.geteuid() == 0 else [])]
     try:
         return driver.chromium.launch(executable_path=program, args=flags, handle_sigint=False)
     except Error as fault:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ import pinocchio as pin
 from sphshell_pin.base.arrays import Array, Longs
 from sphshell_pin.base.atomic import write_whole
 from sphshell_pin.base.checks import check_positive
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
 from sphshell_pin.dynamics.scene.scene import Scene
@@ -30,7 +30,6 @@ from sphshell_pin.view.page import FilmWindow, render_page
 from sphshell_pin.view.patches import RAMP as PRESSURE_RAMP
 from sphshell_pin.view.patches import PatchScale
 from sphshell_pin.view.robot import has_links
-from sphshell_pin.view.surface import Coloring, check_coloring
 
 BARE = (
     "The robot is drawn by its joints, as the scene's model has no geometry: "
@@ -42,7 +41,7 @@ MOST_FRAMES = 1_000_000
 
 
 def write_recording(
-    path: str | PathLike[str],
+    path: StrPath,
     result: Result,
     scene: Scene,
     visual_model: pin.GeometryModel | None = None,
@@ -69,7 +68,7 @@ def render_recording(
     fps: float = 30,
     speed: float = 1.0,
     title: str = "A finished run",
-    color: Coloring = "surface",
+    faces: bool = False,
     span: tuple[float, float] | None = None,
     whole: bool = False,
 ) -> str:
@@ -79,16 +78,15 @@ def render_recording(
     `scene.model`, visual or collision; without one the joints are drawn as a skeleton. `fps` [1/s]
     frames are kept per second of the page, `speed` seconds of simulated time pass in one second of
     it. Each frame shows the recorded row nearest in time, or, where a touch begins and ends between
-    two frames, that touch at its peak. `color` is what the colors of the shells show: nothing
-    ("surface") or the kinds of their faces ("faces"). Of a `span` from and to a time of the run [s]
-    the scene has that part alone, in one frame where both are the same. With `whole` the
-    camera takes in all of the robot, else the surroundings of the contacts.
+    two frames, that touch at its peak. With `faces` the shells are colored by the kinds of their
+    faces. Of a `span` from and to a time of the run [s] the scene has that part alone, in one frame
+    where both are the same. With `whole` the camera takes in all of the robot, else the
+    surroundings of the contacts.
 
     Raises MissingExtra without meshcat, InvalidParameter for an `fps` or `speed` that is not
-    positive, more than MOST_FRAMES frames, another `color`, or a geometry model that does not fit,
-    ResultError without a row of finite numbers.
+    positive, more than MOST_FRAMES frames, or a geometry model that does not fit, ResultError
+    without a row of finite numbers.
     """
-    check_coloring(color)
     check_pace(fps, speed)
     count = sound_rows("the result", result.q, limit=LARGEST)
     contacts = ContactRows.of(result.contacts, result.patch_rows)
@@ -127,7 +125,7 @@ def render_recording(
         arrow_scale=scale,
         pool=min(most, MOST_ARROWS),
     )
-    if color != "surface":
+    if faces:
         display.show("faces", True)
     if shown.patches is not None:
         display.patch_scale = PatchScale.of(shown.patches, view.distance)
@@ -171,7 +169,7 @@ class RecordingView:
     height: int = 480
     hint: str = ""
 
-    def save(self, path: str | PathLike[str]) -> Path:
+    def save(self, path: StrPath) -> Path:
         """Write the page at `path` and return it; ResultError if it cannot be written."""
         return write_whole(path, self.page.encode())
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.nodes import (
     IntArray,
     Json,
@@ -23,16 +22,6 @@ if TYPE_CHECKING:
     from meshcat import Visualizer
 
     from sphshell_pin.shell.shell import Shell
-
-Coloring = Literal["surface", "faces"]
-"""What the colors of shells can show."""
-
-
-def check_coloring(color: str) -> None:
-    """Raise InvalidParameter unless `color` is a Coloring."""
-    if color not in get_args(Coloring):
-        raise InvalidParameter("color", color, f"must be one of {', '.join(get_args(Coloring))}")
-
 
 SURFACE_COLORS = (0x7FA8A0, 0xC4A878, 0x9A94C0, 0xB58C8C)
 EDGE_COLOR = 0x22302E
@@ -140,7 +129,8 @@ def draw_faces(node: Visualizer, shell: Shell, *, curved: bool = False) -> None:
         kind[face.elements] = kinds.index(face.kind)
     mesh = SurfaceMesh.of(shell, curved=curved, patch=shell.element_patch * count + kind)
     colors = hex_colors(tuple(FACE_COLORS.values()))[mesh.patch % count]
-    draw_colored(node["faces"], mesh.vertices, mesh.triangles, colors)
+    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
+    set_object(node["faces"], triangle_mesh(mesh.vertices, mesh.triangles, colors), look)
 
 
 def hex_colors(names: Sequence[str]) -> Array:
@@ -152,12 +142,6 @@ def ramp_colors(share: Array, ramp: Sequence[str]) -> Array:
     """Return colors (n, 3) from 0 to 1 for shares (n,): 0 the first of `ramp`, 1 the last."""
     at, stops = np.linspace(0.0, 1.0, len(ramp)), hex_colors(ramp)
     return np.stack([np.interp(share, at, stops[:, k]) for k in range(3)], axis=1)
-
-
-def draw_colored(node: Visualizer, vertices: Array, triangles: IntArray, colors: Array) -> None:
-    """Draw a mesh at `node` with `colors` (n, 3) from 0 to 1 of its vertices."""
-    look = material("MeshPhong", 0xFFFFFF, vertexColors=True, shininess=10, **PUSHED_BACK)
-    set_object(node, triangle_mesh(vertices, triangles, colors), look)
 
 
 def great_circles(radius: float, points: int = 48) -> tuple[Array, IntArray]:

@@ -116,7 +116,6 @@ def looks(scenario: str) -> dict[str, Callable[[], object]]:
     found |= {f"plot {kind}": lambda kind=kind: load().plot(kind) for kind in KINDS}
     return found | {
         "compare": command("compare", "run", "run", "--out", "compared"),
-        "taxels": command("taxels", "run", "--contact", "ball-plate"),
         "render": command("render", "run", "--out", "picture.png"),
         "view": command("view", "run", "--no-open"),
         "Replay": lambda: Replay("run/run.npz"),

@@ -242,6 +242,10 @@ def test_numbers_that_urdfdom_would_drop_with_their_part_are_refused(tmp_path):
             file.write_text(whole[:at] + number + whole[at + 1 :], encoding="utf-8")
             with pytest.raises(robots.RobotError, match=r"must be [13] finite number"):
                 robots.load_file(file)
+    named = f"""<robot name="x"><link name="${{prefix}}link">{inertial}</link></robot>"""
+    file.write_text(named.replace('value="1"', 'value="nan"', 1))
+    with pytest.raises(robots.RobotError, match=r"link '\$\{prefix\}link': value 'nan' must be 1"):
+        robots.load_file(file)
 
 
 @pytest.mark.parametrize(

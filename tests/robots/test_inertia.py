@@ -170,14 +170,12 @@ def test_a_continuous_joint_mimics_by_its_whole_angle(tmp_path: Path) -> None:
     assert robots.load_file(file, mimic=False).model.nv == 2
 
 
-@pytest.mark.parametrize(
-    ("ixz", "fault"), [("0.01\n", ""), (" 1e-2", ""), ("0,01", "has ixz = '0,01'")]
-)
+@pytest.mark.parametrize(("ixz", "fault"), [("0.01\n", ""), (" 1e-2", ""), ("0,01", "ixz '0,01'")])
 def test_an_inertia_is_never_dropped(tmp_path: Path, ixz: str, fault: str) -> None:
     file = pair(tmp_path, urdf.inertial(2).replace('ixz="0"', f'ixz="{ixz}"'))
     file.write_text(f'<!-- a license -->\n<?xml version="1.0"?>{file.read_text()}')
     if fault:
-        with pytest.raises(robots.RobotError, match=f"inertia of link 'b' {fault}"):
+        with pytest.raises(robots.RobotError, match=f"inertia of link 'b': {fault}"):
             robots.load_file(file)
     else:
         assert robots.load_file(file).model.inertias[1].inertia[0, 2] == 0.01

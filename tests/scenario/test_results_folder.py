@@ -25,7 +25,7 @@ LAST = "summary.json"
 
 def put(folder, text, last=LAST):
     """Write a results folder of two files, and return what is in it."""
-    with AtomicFolder(folder, last=last, inner=["stopped"]) as place:
+    with AtomicFolder(folder, last=last) as place:
         staging = place.staging()
         for name in ("a", last):
             (staging / name).write_text(text)
@@ -86,8 +86,6 @@ def test_files_of_others_stay_the_same_files(tmp_path):
     out.mkdir(mode=0o750)
     (out / "notes.txt").write_text("mine")
     (out / "link").symlink_to("notes.txt")
-    (out / "stopped").mkdir()
-    (out / "stopped" / "run.npz").write_text("stopped")
     with open(out / "log", "w") as log:
         before = os.stat(out / "notes.txt").st_ino
         found = put(out, "new")
@@ -96,7 +94,6 @@ def test_files_of_others_stay_the_same_files(tmp_path):
     assert os.stat(out / "notes.txt").st_ino == before
     assert os.readlink(out / "link") == "notes.txt"
     assert (out / "log").read_text() == "goes on"
-    assert (out / "stopped" / "run.npz").read_text() == "stopped"
     assert stat.S_IMODE(os.stat(out).st_mode) == 0o750
     assert os.listdir(tmp_path) == ["out"]
 

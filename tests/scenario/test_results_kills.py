@@ -32,7 +32,7 @@ from tests.scenario.operations import contents, counted, fill, killed_at, visibl
 from tests.studies import mostly_studies
 
 MESH = Path(__file__).parents[1] / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
-OTHERS = {"notes.txt": b"mine", "stopped/run.npz": b"stopped early", "sweep.parquet": b"of a sweep"}
+OTHERS = {"notes.txt": b"mine", "sweep.parquet": b"of a sweep"}
 
 
 @pytest.fixture
@@ -75,7 +75,6 @@ def results(runs, place, monkeypatch):
 
 def put_others(folder):
     for name, text in OTHERS.items():
-        (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_bytes(text)
 
 

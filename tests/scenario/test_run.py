@@ -101,9 +101,9 @@ def test_a_run_that_stops_early_spares_complete_results(fault, built, tmp_path, 
     stop_early(monkeypatch, fault)
     for _ in range(2):  # partial results give way to later partial ones
         report = run_built(built, out, recording=False)
-        assert report.folder == out / "stopped"
+        assert report.folder == tmp_path / "out-stopped"
         assert before.items() <= visible(out).items()
-        assert sp.Result.load(out / "stopped" / "run.npz").t[-1] == pytest.approx(0.025)
+        assert sp.Result.load(report.folder / "run.npz").t[-1] == pytest.approx(0.025)
         assert any("earlier run" in note for note in report.notes)
     monkeypatch.undo()
     assert run_built(built, out, recording=False).folder == out

@@ -247,7 +247,7 @@ def test_exit_codes_of_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         (["ball", "--frame", "nose"], "no frame 'nose'"),
         (["ball", "--radius", "0"], "radius = 0.0 must be positive"),
         (["ball", "--radius", "wide"], "--radius = 'wide' must be a length"),
-        (["ball", "--json", tmp_path / "no" / "x.json"], "there is no folder"),
+        (["ball", "--json", ROOT / "README.md" / "x.json"], "cannot be written"),
         (["ball", "--json", tmp_path], "is a folder"),
         ([tmp_path], "is a folder, not a file"),
     ):

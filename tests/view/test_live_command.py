@@ -43,7 +43,7 @@ def test_it_serves_a_page_and_ctrl_c_ends_it(tmp_path):
 
 
 def test_a_finished_run_is_a_recording_beside_it(finished):
-    told = view(finished, "--no-open", "--color", "faces", "--speed", "0.5")
+    told = view(finished, "--no-open", "--faces", "--speed", "0.5")
     assert told.exit_code == 0, told.output
     page = finished / "run.html"
     assert told.output.strip() == str(page)
@@ -57,7 +57,6 @@ def test_faults_are_one_sentence(tmp_path, finished):
             (["no_such"], "fingertip_on_blade"),
             ([tmp_path / "no.npz"], "no.npz"),
             ([scenario, "--speed", "0"], "must be from 0.01 to 10"),
-            ([scenario, "--color", "red"], "surface, faces"),
             ([scenario, "--port", "70000"], "65535"),
             ([scenario, "--port", live.server.port], "another port"),
             ([finished, "--set", "gravity.2=0"], "finished run"),

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import sphshell_pin as sp
-from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.view.display import Display
 from sphshell_pin.view.recording import render_recording
 from sphshell_pin.view.surface import FACE_COLORS, SurfaceMesh, hex_colors, outlined_edges, tube
@@ -54,12 +53,10 @@ def test_each_kind_has_its_color(method):
 def test_a_recording_states_the_kinds():
     scene = scene_of(sp.Shell.from_geometry(coal.Cylinder(0.1, 0.3)))
     result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run([0.0, 0.0, 0.3], duration=0.01)
-    for color in ("surface", "faces"):
-        page = render_recording(result, scene, color=color)
-        assert ("on no face recognized" in page) == (color == "faces")
+    for faces in (False, True):
+        page = render_recording(result, scene, faces=faces)
+        assert ("on no face recognized" in page) == faces
     assert FACE_COLORS["torus"] in page
-    with pytest.raises(InvalidParameter, match="surface, faces"):
-        render_recording(result, scene, color="depth")
 
 
 def test_patches_share_no_vertices_and_keep_their_shape():

@@ -8,11 +8,10 @@ import socket
 import stat
 import time
 from collections.abc import Iterator
-from os import PathLike
 from pathlib import Path
 from typing import IO
 
-from sphshell_pin.base.regular_file import open_regular, read_text
+from sphshell_pin.base.regular_file import StrPath, open_regular, read_text
 from sphshell_pin.errors import ResultError
 
 # Errors of file systems without locks, such as Lustre as it is often mounted.
@@ -77,7 +76,7 @@ def _is_at(descriptor: int, path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def atomic_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
+def atomic_file(path: StrPath) -> Iterator[IO[bytes]]:
     """Yield an empty file that replaces the one at `path` if the block ends well.
 
     Whatever ends the process, `path` holds the old bytes or all of the new ones; after a power cut,
@@ -95,7 +94,7 @@ def atomic_file(path: str | PathLike[str]) -> Iterator[IO[bytes]]:
 
 
 @contextlib.contextmanager
-def atomic_path(path: str | PathLike[str], suffix: str) -> Iterator[Path]:
+def atomic_path(path: StrPath, suffix: str) -> Iterator[Path]:
     """Yield where to write the file, for writers that open it by its name; see `atomic_file`.
 
     The name ends in `suffix`. The file there is to be written over, not removed.
@@ -104,7 +103,7 @@ def atomic_path(path: str | PathLike[str], suffix: str) -> Iterator[Path]:
         yield part
 
 
-def write_whole(path: str | PathLike[str], data: bytes) -> Path:
+def write_whole(path: StrPath, data: bytes) -> Path:
     """Write `data` as the file at `path`, in folders that are made; return the path.
 
     Raises
@@ -122,8 +121,24 @@ def write_whole(path: str | PathLike[str], data: bytes) -> Path:
     return path
 
 
+def check_writable(path: Path) -> None:
+    """Raise ResultError unless a file can be written to `path`, in a folder that is made for it.
+
+    It is asked before minutes go into the file's content.
+    """
+    trial = path.with_name(f".{path.name}.try")
+    if path.is_dir():
+        raise ResultError(path, "is a folder: give the name of a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        trial.touch()
+        trial.unlink()
+    except OSError as fault:
+        raise ResultError(path, f"cannot be written: {fault.strerror}") from None
+
+
 @contextlib.contextmanager
-def _aside(path: str | PathLike[str], suffix: str) -> Iterator[tuple[IO[bytes], Path]]:
+def _aside(path: StrPath, suffix: str) -> Iterator[tuple[IO[bytes], Path]]:
     target = Path(os.path.realpath(path))
     mode = target.stat().st_mode if target.exists() else None
     if mode is not None and not stat.S_ISREG(mode):

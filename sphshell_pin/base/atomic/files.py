@@ -9,13 +9,13 @@ import stat
 import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from os import PathLike
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from sphshell_pin._interrupts import interrupts_delayed
 from sphshell_pin.base.atomic.file import holder, lock_file, sign, sync_file, sync_folder
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import ResultError
 
 _AT_FDCWD = -100
@@ -64,8 +64,6 @@ class AtomicFolder:
     path : of the folder; of a symbolic link its target is meant.
     last : name of the file that says that the others are complete. Where files are replaced one by
         one, it is removed first and written last.
-    inner : names of subfolders whose files are linked, too. A folder with any other subfolder is
-        not exchanged: it may be large, or a working directory.
 
     Raises
     ------
@@ -75,10 +73,9 @@ class AtomicFolder:
         It cannot be made or written.
     """
 
-    def __init__(self, path: str | PathLike[str], *, last: str, inner: Sequence[str] = ()) -> None:
+    def __init__(self, path: StrPath, *, last: str) -> None:
         self._folder = Path(os.path.realpath(path))
         self._last = last
-        self._inner = frozenset(inner)
         self._made: list[Path] = []
         self._lock: tuple[Path, int] | None = None
         # Without a lock it is unknown whether another process has ended: its files are left alone.
@@ -86,15 +83,10 @@ class AtomicFolder:
 
     def __enter__(self) -> Self:
         try:
-            folder = self._folder
             self._take()
-            with tempfile.TemporaryFile(dir=folder):
+            with tempfile.TemporaryFile(dir=self._folder):
                 pass
             self._clear()
-            for name in self._inner:
-                if any(folder.glob(f".{name}.*")):  # what a process left that was writing there
-                    with AtomicFolder(folder / name, last=self._last):
-                        pass
         except BaseException:
             self._end()
             raise
@@ -173,7 +165,7 @@ class AtomicFolder:
     def _exchange(self, staging: Path, ours: set[str]) -> bool:
         """Exchange the two folders, the files of others in both; whether that was possible."""
         try:
-            self._link_others(self._folder, staging, ours)
+            self._link_others(staging, ours)
             sync_folder(staging)
             exchange(staging, self._folder)
         except OSError:
@@ -278,23 +270,19 @@ class AtomicFolder:
             if _is_left(place):
                 shutil.rmtree(place)
 
-    def _link_others(self, source: Path, target: Path, ours: set[str]) -> None:
-        """Link all files of `source` but `ours` into `target`, which becomes like it."""
-        about = os.stat(source)
+    def _link_others(self, target: Path, ours: set[str]) -> None:
+        """Link all files of the folder but `ours` into `target`, which becomes like it.
+
+        OSError for a subfolder: it may be large, or a working directory.
+        """
+        about = os.stat(self._folder)
         os.chown(target, about.st_uid, about.st_gid)
-        shutil.copystat(source, target)
-        for entry in os.scandir(source):
-            if entry.name in ours:
-                continue
-            copy = target / entry.name
-            if not entry.is_dir(follow_symlinks=False):
-                os.link(entry, copy, follow_symlinks=False)
-            elif source == self._folder and entry.name in self._inner:
-                copy.mkdir()
-                self._link_others(Path(entry), copy, set())
-                sync_folder(copy)
-            else:
-                raise OSError(f"{entry.path} is a folder of others")
+        shutil.copystat(self._folder, target)
+        for entry in os.scandir(self._folder):
+            if entry.name not in ours:
+                if entry.is_dir(follow_symlinks=False):
+                    raise OSError(f"{entry.path} is a folder of others")
+                os.link(entry, target / entry.name, follow_symlinks=False)
 
 
 def _is_left(place: Path) -> bool:
@@ -313,11 +301,7 @@ def _bring_back(left: Path, folder: Path, ours: set[str]) -> None:
     """
     for entry in list(os.scandir(left)):
         there = folder / entry.name
-        if entry.name in ours:
-            os.unlink(entry)
-        elif entry.is_dir(follow_symlinks=False) and there.is_dir():
-            _bring_back(Path(entry), there, set())
-        elif _is_older(entry, there):
+        if entry.name in ours or _is_older(entry, there):
             os.unlink(entry)
         else:
             os.rename(entry, there)
@@ -335,11 +319,11 @@ def _is_older(entry: os.DirEntry[str], there: Path) -> bool:
 
 
 @contextlib.contextmanager
-def held_folder(folder: Path, last: str, inner: Sequence[str] = ()) -> Iterator[AtomicFolder]:
+def held_folder(folder: Path, last: str) -> Iterator[AtomicFolder]:
     """Hold a folder, see `AtomicFolder`; ResultError where it cannot be, or another has it."""
     with contextlib.ExitStack() as held:
         try:
-            place = held.enter_context(AtomicFolder(folder, last=last, inner=inner))
+            place = held.enter_context(AtomicFolder(folder, last=last))
         except FolderInUse as busy:
             advice = "wait until it ends, or give another folder with --out"
             raise ResultError(folder, f"{busy}: {advice}") from None
@@ -350,9 +334,7 @@ def held_folder(folder: Path, last: str, inner: Sequence[str] = ()) -> Iterator[
 
 
 def write_folder(
-    folder: str | PathLike[str],
-    files: Mapping[str, bytes] | Iterable[tuple[str, bytes]],
-    every: Sequence[str],
+    folder: StrPath, files: Mapping[str, bytes] | Iterable[tuple[str, bytes]], every: Sequence[str]
 ) -> list[Path]:
     """Write `files`, names and contents, into `folder`, all or none; return their paths.
 

@@ -276,17 +276,14 @@ def composite(robot: Robot) -> list[Block]:
         if body.carried is not None and body.pushed is not None:
             inertia = inertia.plus(SpatialInertia.of_entries(body.carried[1]))
             force = force + body.pushed[1]
-        _add_to(block, {f"b[{k}]": x for k, x in _entries(body, body.axes.T @ force)})
+        along = body.axes.T @ force
+        _add_to(block, {f"b[{k}]": along[row] for row, k in enumerate(body.columns)})
         _add_to(block, _mass_columns(robot, body, inertia))
         if parent is not None:
             robot.add(block, "carried", parent, body.to_parent(inertia).entries())
             robot.add(block, "pushed", parent, body.force_to_parent(force))
         blocks.append(block)
     return blocks
-
-
-def _entries(body: Body, vector: Expression) -> list[tuple[int, Expression]]:
-    return [(k, vector[row]) for row, k in enumerate(body.columns)]
 
 
 def _mass_columns(robot: Robot, body: Body, inertia: SpatialInertia) -> dict[str, Expression]:

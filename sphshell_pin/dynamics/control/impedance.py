@@ -17,7 +17,7 @@ from sphshell_pin.base.parameters import parameter
 from sphshell_pin.dynamics.control.controllers import Controller, Gain, Posture, ShellPlace
 from sphshell_pin.dynamics.control.target_path import Curve, Timing, path_fields
 from sphshell_pin.dynamics.result.result import Result
-from sphshell_pin.dynamics.scene.models import find_frame, model_reach
+from sphshell_pin.dynamics.scene.models import find_frame, find_moving_frame, model_reach
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.shell import Shell
@@ -147,14 +147,12 @@ class CartesianImpedance(Controller, kind="cartesian-impedance"):
     def _fields(self, scene: Scene, q0: Array) -> dict[str, ArrayLike]:
         """Resample the path, project it, find the frames."""
         model = scene.model
-        frame_index = find_frame(model, self.frame)
+        frame_index = find_moving_frame(model, self.frame)
         if isinstance(self.shell, str):
             raise InvalidParameter("shell", self.shell, "must be a Shell: names are for files")
         if self.normal_force and self.shell is None:
             raise InvalidParameter("normal_force", self.normal_force, "needs a shell to press on")
         frame = model.frames[frame_index]
-        if not frame.parentJoint:
-            raise InvalidParameter("frame", self.frame, "is fixed to the world: nothing would move")
         carrier_name, placement = self._shell_place(scene)
         carrier_index = find_frame(model, carrier_name, "shell_frame")
         carrier = model.frames[carrier_index]

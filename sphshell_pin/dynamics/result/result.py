@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike
 from sphshell_pin.base import upward
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_finite, read_only
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.dynamics.result import result_columns, result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
@@ -151,7 +151,7 @@ class Result(Summarized):
             )
         return self.patch_rows
 
-    def save(self, path: str | PathLike[str], *, home: str | PathLike[str] | None = None) -> Path:
+    def save(self, path: StrPath, *, home: StrPath | None = None) -> Path:
         """Write a compressed .npz file, whole or not at all.
 
         It has the robots and surfaces of a scenario, to show them, but no scene of one's own. The
@@ -163,7 +163,7 @@ class Result(Summarized):
         return save_result(self, Path(path), home)
 
     @classmethod
-    def load(cls, path: str | PathLike[str], *, max_size: float = 2e9) -> Result:
+    def load(cls, path: StrPath, *, max_size: float = 2e9) -> Result:
         """Read what save() wrote; nothing in the file is ever executed.
 
         `max_size` is the memory that its arrays may need [B]: a small file may hold large ones.
@@ -215,9 +215,7 @@ class Result(Summarized):
         """
         return sensor_columns(self.sensors)
 
-    def to_mcap(
-        self, path: str | PathLike[str], scene: Scene | None = None, *, start: int = 0
-    ) -> Path:
+    def to_mcap(self, path: StrPath, scene: Scene | None = None, *, start: int = 0) -> Path:
         """Write the run as an MCAP file of ROS 2 messages, for Foxglove, RViz and rosbag2.
 
         `scene` is what moved (default: the one that ran, or that of the scenario the result came
@@ -242,9 +240,9 @@ class Result(Summarized):
         """
         return upward.layers.plot_result(self, kind, scene)
 
-    def save_figures(self, folder: str | PathLike[str], scene: Scene | None = None) -> list[Path]:
+    def save_figures(self, folder: StrPath, scene: Scene | None = None) -> list[Path]:
         """Write the figures as .png files into `folder`; see `sphshell_pin.plot.save_figures`."""
-        return upward.layers.save_figures(self, folder, scene=scene)
+        return upward.layers.save_figures(self, folder, scene)
 
     def view(
         self,
@@ -270,7 +268,7 @@ class Result(Summarized):
 
     def render(
         self,
-        path: str | PathLike[str],
+        path: StrPath,
         scene: Scene | None = None,
         visual_model: pin.GeometryModel | None = None,
         **options: Any,

@@ -6,7 +6,6 @@ anything: sizes are compared before memory is taken, nothing is ever unpickled.
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
@@ -15,7 +14,6 @@ import zipfile
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, fields
 from functools import partial
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -26,7 +24,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from sphshell_pin.base.arrays import Announced, Kind, misfit
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import read_only
-from sphshell_pin.base.regular_file import open_regular
+from sphshell_pin.base.regular_file import StrPath, open_regular
 from sphshell_pin.dynamics.result import result_parts
 from sphshell_pin.dynamics.result.run_stats import EventKind, RunStats
 from sphshell_pin.dynamics.run.sensitivities import Sensitivities
@@ -125,7 +123,7 @@ class Header(_Part):
     sensitivities: list[str] = []
 
 
-def save_result(result: Result, path: Path, home: str | PathLike[str] | None) -> Path:
+def save_result(result: Result, path: Path, home: StrPath | None) -> Path:
     """See Result.save."""
     arrays: Columns = {"t": result.t, "q": result.q, "v": result.v}
     for part in ("contacts", "energy"):
@@ -173,10 +171,8 @@ def _origin_in_file(origin: result_parts.Origin, home: Path) -> dict[str, object
         return {"scenario": scenario, "settings": settings}
     # Results and scenario may move together, or the results alone: both paths are written.
     path = os.path.abspath(scenario)
-    # Another drive has no relative path.
-    with contextlib.suppress(ValueError):
-        scenario = Path(os.path.relpath(path, home.absolute())).as_posix()
-    return {"scenario": scenario, "settings": settings, "path": path}
+    near = os.path.relpath(path, home.absolute())
+    return {"scenario": near, "settings": settings, "path": path}
 
 
 def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
@@ -200,7 +196,7 @@ def _write(path: Path, header: Mapping[str, object], arrays: Columns) -> None:
         raise ResultError(path, f"cannot write the results: {error.strerror}") from error
 
 
-def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) -> Result:
+def load_result(kind: type[Result], path: StrPath, max_size: float) -> Result:
     """See Result.load; `kind` is Result, of which this module knows nothing else."""
     header, arrays = _read_file(path, max_size)
 
@@ -247,7 +243,7 @@ def load_result(kind: type[Result], path: str | PathLike[str], max_size: float) 
     )
 
 
-def _read_file(path: str | PathLike[str], max_size: float) -> tuple[Header, Columns]:
+def _read_file(path: StrPath, max_size: float) -> tuple[Header, Columns]:
     """Return the header and the ARRAYS of the results at `path`.
 
     Raises
@@ -270,9 +266,7 @@ def _read_file(path: str | PathLike[str], max_size: float) -> tuple[Header, Colu
         raise ResultError(path, f"is not a file that Result.save wrote ({why})") from error
 
 
-def _read(
-    path: str | PathLike[str], archive: zipfile.ZipFile, max_size: float
-) -> tuple[Header, Columns]:
+def _read(path: StrPath, archive: zipfile.ZipFile, max_size: float) -> tuple[Header, Columns]:
     files = {one.filename: one for one in archive.infolist()}
     arrays_in = _wanted({name for name, part in _IN_FILE.items() if f"{part}.npy" in files})
     parts = {"header": "header.npy"} | {name: f"{_IN_FILE[name]}.npy" for name in arrays_in}

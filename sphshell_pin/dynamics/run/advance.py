@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 import os
+import resource
 import signal
 import threading
 import warnings
@@ -167,11 +168,7 @@ class KeptRows:
 
 
 def _peak_memory() -> float:
-    """Return the most memory that this process has had [bytes]; 0 where that is not known."""
-    try:
-        import resource  # not on Windows
-    except ImportError:
-        return 0.0
+    """Return the most memory that this process has had [bytes]."""
     unit = 1 if os.uname().sysname == "Darwin" else 1024
     return float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 

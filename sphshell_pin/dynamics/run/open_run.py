@@ -17,11 +17,11 @@ from sphshell_pin.dynamics.result.run_stats import RunStats
 from sphshell_pin.dynamics.run import advance as advancing
 from sphshell_pin.dynamics.run.advance import advance
 from sphshell_pin.dynamics.run.simulation import Simulation
-from sphshell_pin.dynamics.scene.models import find_frame
+from sphshell_pin.dynamics.scene.models import find_moving_frame
 from sphshell_pin.dynamics.scene.one_user import one_at_a_time
 from sphshell_pin.dynamics.scene.scene import ContactPair, Scene
 from sphshell_pin.dynamics.sensing.sensors import SensorSet
-from sphshell_pin.errors import InvalidParameter, NotPicklable
+from sphshell_pin.errors import NotPicklable
 
 # The compiled loop wants an end [s]; steps of a microsecond can be counted so far.
 _FOR_EVER = 1e6
@@ -215,10 +215,8 @@ class OpenRun:
     def _act(self, frame: str, point: Array, force: Array, anchor: Array, *spring: float) -> None:
         """Let a force and a spring to an anchor (stiffness, damping) act on a point of `frame`."""
         model = self.scene.model
-        number = find_frame(model, frame)
+        number = find_moving_frame(model, frame)
         where = model.frames[number]
-        if where.parentJoint == 0:
-            raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
         at = where.placement.act(point)
         stiffness, damping = spring
         self._core.push(where.parentJoint, at, force, anchor, stiffness, damping, number)

@@ -14,6 +14,7 @@ import numpy as np
 
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.summary import names as listed
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
@@ -183,11 +184,11 @@ def _joints_modelled(scene: Scene) -> list[str]:
     for kind in scene.joints.kinds():
         names = list(getattr(scene.joints, kind))
         only = " (reported where they are exceeded)" if kind == "speed" else ""
-        out.append(f"{_JOINT_KINDS[kind]} of {_names(names)}{only}")
+        out.append(f"{_JOINT_KINDS[kind]} of {listed(names)}{only}")
     model = scene.model
     mimics = [str(model.names[j]) for j in model.mimicking_joints]
     if mimics:
-        out.append(f"joints that mimic others, exactly: {_names(mimics)}")
+        out.append(f"joints that mimic others, exactly: {listed(mimics)}")
     return out
 
 
@@ -201,13 +202,8 @@ def _joints_stated(scene: Scene) -> list[str]:
         modelled = getattr(scene.joints, kind)
         left_out = [name for name in getattr(stated, kind) if name not in modelled]
         if left_out:
-            out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {_names(left_out)}")
+            out.append(f"{_JOINT_KINDS[kind]} that the robot's file states, of {listed(left_out)}")
     return out
-
-
-def _names(names: list[str]) -> str:
-    shown = ", ".join(f"'{name}'" for name in names[:4])
-    return shown if len(names) <= 4 else f"{shown}, ... ({len(names)} joints)"
 
 
 def explain_pairs(

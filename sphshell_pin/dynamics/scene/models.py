@@ -32,6 +32,18 @@ def find_frame(model: pin.Model, name: str, called: str = "frame") -> int:
     return found[first]
 
 
+def joint_of(model: pin.Model, frame: str) -> int:
+    """Return the joint that carries the frame called so; FrameNotFound lists the names."""
+    return int(model.frames[find_frame(model, frame)].parentJoint)
+
+
+def find_moving_frame(model: pin.Model, name: str) -> int:
+    """Return the index of the frame called `name`; InvalidParameter if no joint moves it."""
+    if not joint_of(model, name):
+        raise InvalidParameter("frame", name, "is fixed to the world: nothing would move")
+    return find_frame(model, name)
+
+
 def frame_on_joint(model: pin.Model, joint: int) -> str | None:
     """Return the name of a frame that `find_frame` finds on `joint`, the joint's own if it can."""
     names = [model.names[joint], *(f.name for f in model.frames if f.parentJoint == joint)]

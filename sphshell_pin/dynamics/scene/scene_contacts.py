@@ -51,13 +51,10 @@ class SceneContacts(Summarized):
         return len(self.depth)
 
     def _facts(self) -> list[Fact]:
-        facts = [Fact("contacts", len(self))]
-        if not len(self):
-            return facts
         return [
-            *facts,
-            Fact("largest normal force", float(self.normal_force.max()), "N"),
-            Fact("largest depth", float(self.depth.max()), "m"),
+            Fact("contacts", len(self)),
+            Fact("largest normal force", float(self.normal_force.max(initial=0.0)), "N"),
+            Fact("largest depth", float(self.depth.max(initial=0.0)), "m"),
         ]
 
     @property

@@ -15,14 +15,8 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from sphshell_pin import _core
+from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.checks import (
-    check_configuration,
-    check_moved_mass,
-    check_name,
-    check_names,
-    check_vector,
-)
 from sphshell_pin.base.summary import Fact, Summarized, names
 from sphshell_pin.contact import Friction, FunctionFriction, NormalLaw, Plane, Sphere
 from sphshell_pin.contact.normal_law import check_law
@@ -63,11 +57,11 @@ class SceneParts(Summarized):
         if not isinstance(model, pin.Model):
             raise InvalidParameter("model", type(model).__name__, "must be a pinocchio.Model")
         models.check_model(model)
-        self.lock = check_names("lock", lock)
+        self.lock = checks.check_names("lock", lock)
         if q_lock is None:
             q = pin.neutral(model)
         elif self.lock:
-            q = check_configuration("q_lock", model, q_lock)
+            q = checks.check_configuration("q_lock", model, q_lock)
         else:
             raise InvalidParameter(
                 "q_lock", q_lock, "must come with lock, the joints to hold there"
@@ -117,7 +111,7 @@ class SceneParts(Summarized):
     def _check_moved_mass(self) -> None:
         """Raise InvalidParameter for a joint that moves no mass, as runs do."""
         if not self._moves_mass:
-            check_moved_mass(self._model)
+            checks.check_moved_mass(self._model)
             self._moves_mass = True
 
     @property
@@ -236,7 +230,7 @@ class SceneParts(Summarized):
 
     def pair(self, name: str) -> ContactPair:
         """Return the pair called `name`; NameNotFound lists them."""
-        check_name("name", name)
+        checks.check_name("name", name)
         for pair in self._pairs:
             if pair.name == name:
                 return pair
@@ -287,10 +281,6 @@ class SceneParts(Summarized):
             effects.use(self._robot)
         return effects
 
-    def shares_model(self, other: SceneParts) -> bool:
-        """Whether both scenes have one model, as those that `with_pairs` makes."""
-        return self._model is other._model
-
     def _check_unchanged(self) -> None:
         """Raise InvalidParameter if somebody has changed the model that they got of this scene."""
         if self._shown is not None:
@@ -317,7 +307,7 @@ class SceneParts(Summarized):
     def _pair_name(self, name: str | None, default: str) -> str:
         taken = {p.name for p in self._pairs}
         if name is not None:
-            check_name("name", name)
+            checks.check_name("name", name)
             if name in taken:
                 raise InvalidParameter("name", name, "is taken by another contact of this scene")
             return name
@@ -349,9 +339,10 @@ def checked_state(
     what = f": this model has nq = {model.nq}, nv = {model.nv}"
     if lock:
         what += f" after locking {', '.join(lock)}"
-    q = check_configuration("q", model, q, what)
-    v = np.zeros(model.nv) if v is None else check_vector("v", v, model.nv, what)
-    tau = np.zeros(model.nv) if tau is None else check_vector("tau", tau, model.nv, " [N m or N]")
+    q = checks.check_configuration("q", model, q, what)
+    none = np.zeros(model.nv)
+    v = checks.check_vector("v", none if v is None else v, model.nv, what)
+    tau = checks.check_vector("tau", none if tau is None else tau, model.nv, " [N m or N]")
     return q, v, tau
 
 

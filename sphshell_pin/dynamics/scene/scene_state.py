@@ -114,7 +114,7 @@ class SceneState(Summarized):
 
     def core_of(self, scene: Scene) -> _core.SceneState:
         """Return the C++ binding; InvalidParameter unless `scene` is the one it was made of."""
-        if scene.pairs is not self._pairs or not scene.shares_model(self._scene):
+        if scene.pairs is not self._pairs or scene._model is not self._scene._model:
             raise InvalidParameter(
                 "state",
                 self,

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
 
 
 def add_pairs(
-    scene: Scene,
-    geometry_model: pin.GeometryModel,
-    law: NormalLaw,
-    friction: Friction | None,
+    scene: Scene, geometry_model: pin.GeometryModel, law: NormalLaw, friction: Friction | None
 ) -> None:
     """Add a contact to `scene` for every collision pair of a sphere and something else."""
     check_type(

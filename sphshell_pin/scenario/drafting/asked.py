@@ -1,10 +1,7 @@
 """What a user asks of a new scenario, as one object."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +9,7 @@ import numpy as np
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.checks import check_points, check_positive, check_vector
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.drafting.limb_ends import Tip
@@ -84,8 +82,8 @@ class Asked:
         Called with a sentence for each draft that failed, while others are tried.
     """
 
-    robot: str | PathLike[str]
-    surface: str | PathLike[str] = "plane"
+    robot: StrPath
+    surface: StrPath = "plane"
     frame: str | None = None
     radius: float | None = None
     offset: Array | None = None
@@ -102,11 +100,11 @@ class Asked:
     length: float | None = None
     tips: Literal["one", "all"] = "one"
     base: Literal["fixed", "floating"] | None = None
-    package_dirs: Sequence[str | PathLike[str]] = ()
+    package_dirs: Sequence[StrPath] = ()
     xacro_args: Mapping[str, str] | None = None
     density: float | None = None
     mimic: bool = True
-    out: str | PathLike[str] | None = None
+    out: StrPath | None = None
     force: bool = False
     tell: Callable[[str], None] | None = None
 

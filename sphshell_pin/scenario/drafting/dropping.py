@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.dynamics.scene.models import joint_of, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import joints_without_mass
-from sphshell_pin.scenario.drafting.limb_ends import joint_of, sphere_centers
+from sphshell_pin.scenario.drafting.limb_ends import sphere_centers
 from sphshell_pin.scenario.drafting.part import GRAVITY
 from sphshell_pin.scenario.drafting.plan import Contact, Hold, Plan, chosen_materials
 from sphshell_pin.scenario.drafting.poses import joints_aside

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
-from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint, model_reach
+from sphshell_pin.dynamics.scene.models import find_frame, frame_on_joint, joint_of, model_reach
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import TIPS, LoadedRobot, end_spheres, fingertips, floats
 from sphshell_pin.scenario.drafting.limb_ends import (
@@ -18,7 +18,6 @@ from sphshell_pin.scenario.drafting.limb_ends import (
     LinkGeometry,
     Tip,
     gripper_joints,
-    joint_of,
     sphere_centers,
 )
 

@@ -10,9 +10,10 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import leader_of, mimics
+from sphshell_pin.dynamics.scene.models import joint_of
 from sphshell_pin.scenario.drafting.clearance import Links
 from sphshell_pin.scenario.drafting.force_balance import least_friction
-from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.drafting.poses import joints_aside
 from sphshell_pin.scenario.drafting.vectors import moved, unit

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import find_frame, model_reach
 from sphshell_pin.robots import LoadedRobot
@@ -56,11 +57,6 @@ class Tip:
         )
 
 
-def joint_of(model: pin.Model, frame: str) -> int:
-    """Return the joint that carries a frame; FrameNotFound lists the names."""
-    return int(model.frames[find_frame(model, frame)].parentJoint)
-
-
 def sphere_centers(model: pin.Model, q: Array, tips: Sequence[Tip]) -> Array:
     """Return the spheres' centers (k, 3) [m] in the world at q (nq,)."""
     data = model.createData()
@@ -76,7 +72,7 @@ def gripper_joints(model: pin.Model) -> set[int]:
     """
     rules, found = mimics(model), set[int]()
     coupled = {*rules, *(rule.of for rule in rules.values())}
-    slide = {j for j in range(model.njoints) if _slides(model.joints[j])}
+    slide = {j for j in range(model.njoints) if joint_slides(model.joints[j])}
     for carrier in range(1, model.njoints):
         behind = set(map(int, model.subtrees[carrier])) - {carrier}
         ends = behind - {int(model.parents[one]) for one in behind}
@@ -87,10 +83,6 @@ def gripper_joints(model: pin.Model) -> set[int]:
         if len(ends) > 1 and (named or sliding):
             found |= behind
     return found
-
-
-def _slides(joint: pin.JointModel) -> bool:
-    return bool(joint.shortname().startswith("JointModelP"))
 
 
 class LinkGeometry:
@@ -181,7 +173,7 @@ class LinkGeometry:
             axis = place.rotation @ (motion[:3] + motion[3:])
             aside = (here - origin) - axis * (axis @ (here - origin))
             size = float(np.linalg.norm(np.ptp(self.corners, axis=0)))
-            if not _slides(joint) and np.linalg.norm(aside) >= _AT_AXIS * size:
+            if not joint_slides(joint) and np.linalg.norm(aside) >= _AT_AXIS * size:
                 away = aside
             elif self._moves_along(axis):
                 away = axis * np.sign(axis @ away or 1.0)

@@ -1,18 +1,15 @@
 """A new scenario from a robot and a surface, with values chosen for their sizes."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from sphshell_pin.base.atomic import write_whole
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.dynamics.scene.models import radius_fault
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.robots import RobotError, floats, is_path, joints_without_mass
@@ -44,9 +41,7 @@ _DENSITY = 2700.0
 _MOST_ENDS = 2
 
 
-def new_scenario(
-    robot: str | PathLike[str], surface: str | PathLike[str] = "plane", **options: Any
-) -> NewScenario:
+def new_scenario(robot: StrPath, surface: StrPath = "plane", **options: Any) -> NewScenario:
     """Write a scenario in which `robot` touches `surface`, with values that work for its size.
 
     Drafts are run; the first is written that touches, holds its force within 5 %, and keeps the
@@ -248,11 +243,8 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
 
 
 def _relative(file: Path, path: Path) -> str:
-    """Return `file` relative to the scenario at `path`; absolute where that cannot be."""
-    try:
-        return Path(os.path.relpath(file, path.parent)).as_posix()
-    except ValueError:  # another drive
-        return file.absolute().as_posix()
+    """Return `file` relative to the scenario at `path`."""
+    return os.path.relpath(file, path.parent)
 
 
 def _build_bare(

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.dynamics.scene.models import joint_of
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
 from sphshell_pin.scenario.drafting.asked import PLACES, Asked
 from sphshell_pin.scenario.drafting.fingertips import other_ends
-from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.paths import SHORTEST_PATH, find_way
 from sphshell_pin.scenario.drafting.placing import STEEP, Bench, Place
 from sphshell_pin.scenario.drafting.plan import (

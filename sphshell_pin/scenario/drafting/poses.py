@@ -9,10 +9,10 @@ import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.scene.mimic import group_of
-from sphshell_pin.dynamics.scene.models import mass_matrix
+from sphshell_pin.dynamics.scene.models import joint_of, mass_matrix
 from sphshell_pin.robots import joints_without_mass
 from sphshell_pin.scenario.drafting.asked import PLACES
-from sphshell_pin.scenario.drafting.limb_ends import Tip, joint_of
+from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, unit
 from sphshell_pin.scenario.format.reach import Reach, turn_between
 

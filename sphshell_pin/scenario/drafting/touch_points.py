@@ -13,7 +13,7 @@ from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, tangents, unit
 from sphshell_pin.scenario.drafting.wording import listed
 from sphshell_pin.shell.faces import Face, described
-from sphshell_pin.shell.raw import KINDS
+from sphshell_pin.shell.raw import KINDS, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell
 
 # A path on a surface ends before a turn this sharp from one of its points to the next.
@@ -118,8 +118,7 @@ def roomy_places(shell: Shell, facets: NDArray[np.bool_]) -> tuple[list[Array], 
 
     The best is the farthest from where the surface ends, or turns sharply: so far [m].
     """
-    corners, rng = shell.vertices[shell.triangles], np.random.default_rng(0)
-    normals, areas, facing = shell.triangle_normals, facet_areas(shell), np.flatnonzero(facets)
+    normals, facing = shell.triangle_normals, np.flatnonzero(facets)
     if not len(facing):
         return [], 0.0
     ends = np.sort(shell.triangles[facing][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -130,8 +129,8 @@ def roomy_places(shell: Shell, facets: NDArray[np.bool_]) -> tuple[list[Array], 
     sharp = (count != 2) | (np.linalg.norm(total, axis=1) < 2 * np.cos(0.5 * _SHARP_ANGLE))
     start, end = np.moveaxis(shell.vertices[ends[sharp]], 1, 0)
     along = end - start
-    some = rng.choice(facing, _SAMPLES, p=areas[facing] / areas[facing].sum())
-    points = np.einsum("ij,ijk->ik", rng.dirichlet(np.ones(3), _SAMPLES), corners[some])
+    corners = shell.vertices[shell.triangles[facing]]
+    points = random_places(corners, _SAMPLES, np.random.default_rng(0))[1]
     room = np.full(_SAMPLES, np.inf)
     for k, point in enumerate(points):
         away = point - start
@@ -202,8 +201,7 @@ def _walk(shell: Shell, place: TouchPoint, direction: Array, steps: int, spacing
 
 def facet_areas(shell: Shell) -> Array:
     """Return the areas (n,) [m2] of the triangles."""
-    a, b, c = np.moveaxis(shell.vertices[shell.triangles], 1, 0)
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+    return np.asarray(0.5 * np.linalg.norm(area_vectors(shell.vertices[shell.triangles]), axis=1))
 
 
 def _bulge(shell: Shell) -> Array | None:

@@ -197,7 +197,7 @@ def _tip_frame(
         moves = (
             sphere is not None
             and sphere.frame.startswith(prefix)
-            and int(model.frames[models.find_frame(model, sphere.frame)].parentJoint) > 0
+            and models.joint_of(model, sphere.frame) > 0
         )
         if sphere is not None and moves:
             return sphere.frame, sphere.offset

@@ -3,7 +3,6 @@
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ import pinocchio as pin
 from sphshell_pin import errors
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.parameters import Component, parameters_of
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.contact.friction import Friction
 from sphshell_pin.contact.function_laws import FunctionFile, FunctionFrictionFile
@@ -72,10 +71,7 @@ class Built(Summarized):
 
 
 def build(
-    name: str | PathLike[str],
-    changes: Mapping[str, str] | None = None,
-    *,
-    reuse: Built | None = None,
+    name: StrPath, changes: Mapping[str, str] | None = None, *, reuse: Built | None = None
 ) -> Built:
     """Build the scenario called `name` (shipped, or a path), with `changes` by dotted key.
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 from sphshell_pin.contact import Plane, Sphere
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.dynamics.scene.joint_components import JointComponents, JointFriction, JointLimits
-from sphshell_pin.dynamics.scene.models import find_frame, find_joint
+from sphshell_pin.dynamics.scene.models import find_frame, find_joint, joint_of
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import collision_spheres
 from sphshell_pin.scenario.format import schema
@@ -52,12 +52,8 @@ def spheres_of(contact: schema.ContactSection, assembly: Assembly, carrier: str)
     ]
     how = "state each as { frame, radius, offset }"
     if contact.spheres == "collision":
-        model = assembly.model
-
-        def body(frame: str) -> int:
-            return int(model.frames[find_frame(model, frame)].parentJoint)
-
-        found = [one for one in known if body(one.frame) != body(carrier)]
+        own = joint_of(assembly.model, carrier)
+        found = [one for one in known if joint_of(assembly.model, one.frame) != own]
         if not found:
             what = "no collision geometry of the robot is a sphere on another body than the shell"
             raise SphshellError(f"{what}: {how}")

@@ -8,14 +8,13 @@ import shlex
 import tomllib
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 from pydantic import ValidationError
 
 from sphshell_pin.base.parameters import parameters_of
-from sphshell_pin.base.regular_file import MOST_TEXT, read_text, why_no_file
+from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_text, why_no_file
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
@@ -38,7 +37,7 @@ def shipped_scenarios() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def find_scenario(name: str | PathLike[str]) -> Path:
+def find_scenario(name: StrPath) -> Path:
     """Return the file of a shipped scenario's name or of a path.
 
     Raises
@@ -69,7 +68,7 @@ def find_scenario(name: str | PathLike[str]) -> Path:
     raise NameNotFound("scenario", str(name), "beside .toml files, sphshell-pin", shipped)
 
 
-def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None = None) -> Scenario:
+def read_scenario(path: StrPath, changes: Mapping[str, str] | None = None) -> Scenario:
     """Read and check the scenario at `path`, with values changed by dotted key.
 
     `changes` maps keys such as "run.dt" or "contact.tip-blade.law.stiffness" (list items by their
@@ -84,7 +83,7 @@ def read_scenario(path: str | PathLike[str], changes: Mapping[str, str] | None =
     return change_scenario(scenario, changes, path) if changes else scenario
 
 
-def parse_scenario(text: str, path: str | PathLike[str]) -> Scenario:
+def parse_scenario(text: str, path: StrPath) -> Scenario:
     """Read and check the scenario that `text` says; `path` is the file it belongs to.
 
     Raises
@@ -106,9 +105,7 @@ def parse_scenario(text: str, path: str | PathLike[str]) -> Scenario:
     return _validated(data, path)
 
 
-def change_scenario(
-    scenario: Scenario, changes: Mapping[str, str], path: str | PathLike[str]
-) -> Scenario:
+def change_scenario(scenario: Scenario, changes: Mapping[str, str], path: StrPath) -> Scenario:
     """Return `scenario`, read from `path`, with more values changed as `read_scenario` does.
 
     Raises
@@ -122,10 +119,7 @@ def change_scenario(
 
 
 def change_data(
-    data: dict[str, Toml],
-    changes: Mapping[str, Toml],
-    scenario: Scenario,
-    path: str | PathLike[str],
+    data: dict[str, Toml], changes: Mapping[str, Toml], scenario: Scenario, path: StrPath
 ) -> None:
     """Put values in place of those of `data`, which the file of `scenario` at `path` gives.
 
@@ -169,7 +163,7 @@ class Found(NamedTuple):
     """The names of `key`, which may hold dots."""
 
 
-def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
+def look_up(scenario: Scenario, key: str, path: StrPath) -> Found:
     """Return what is at a dotted key of `scenario`.
 
     Raises
@@ -190,7 +184,7 @@ def look_up(scenario: Scenario, key: str, path: str | PathLike[str]) -> Found:
     return Found(value, ".".join([*trail, last]), [*trail, last])
 
 
-def full_name(scenario: Scenario, key: str, path: str | PathLike[str]) -> str:
+def full_name(scenario: Scenario, key: str, path: StrPath) -> str:
     """Return the key with all names spelled out; one that is not in the scenario as it is."""
     try:
         return look_up(scenario, key, path).key
@@ -214,7 +208,7 @@ def child_of(owner: object, part: str) -> object:
     return owner.get(part) if isinstance(owner, Mapping) else getattr(owner, part, None)
 
 
-def _validated(data: dict[str, Toml], path: str | PathLike[str]) -> Scenario:
+def _validated(data: dict[str, Toml], path: StrPath) -> Scenario:
     try:
         scenario = Scenario.model_validate(data)
     except ValidationError as error:
@@ -249,7 +243,7 @@ def item_key(table: str, items: Sequence[Toml], index: int) -> str:
     return f"{table}.{name}" if name and names.count(name) == 1 else f"{table}[{index}]"
 
 
-def _read_text(path: str | PathLike[str]) -> str:
+def _read_text(path: StrPath) -> str:
     try:
         return read_text(path, MOST_TEXT)
     except OSError as error:
@@ -267,7 +261,7 @@ def parse_value(text: str) -> Toml:
 
 
 def _change(
-    data: dict[str, Toml], key: str, value: Toml, path: str | PathLike[str], scenario: Scenario
+    data: dict[str, Toml], key: str, value: Toml, path: StrPath, scenario: Scenario
 ) -> None:
     """Put `value` in place of the one at the dotted `key`; names of list items may hold dots.
 
@@ -297,9 +291,7 @@ def _change(
     node[last] = value
 
 
-def _descend(
-    data: dict[str, Toml], key: str, path: str | PathLike[str]
-) -> tuple[Toml, str, list[str]]:
+def _descend(data: dict[str, Toml], key: str, path: StrPath) -> tuple[Toml, str, list[str]]:
     """Follow the dotted `key` as far as `data` goes: table or list, the rest, the names so far."""
     rest, trail = key, list[str]()
     node: Toml = data
@@ -356,9 +348,7 @@ def _name_of(item: object) -> str:
     return str(get("label", "") or get("name", "") or "")
 
 
-def _explain(
-    error: ValidationError, path: str | PathLike[str], data: Mapping[str, Toml]
-) -> ScenarioError:
+def _explain(error: ValidationError, path: StrPath, data: Mapping[str, Toml]) -> ScenarioError:
     """Turn the first of pydantic's complaints into one sentence with the valid choices."""
     details = sorted(error.errors(), key=lambda one: one["type"] != "unknown_key")
     first = details[0]

@@ -98,10 +98,7 @@ def _changed_entry(entry: Entry, parts: Mapping[str, Mapping[str, float]]) -> En
 
 
 def _changed_pair(
-    pair: ContactPair,
-    entry: Entry,
-    built: Built,
-    parts: Mapping[str, Mapping[str, float]],
+    pair: ContactPair, entry: Entry, built: Built, parts: Mapping[str, Mapping[str, float]]
 ) -> ContactPair:
     if "sphere" in parts:
         pair = with_value(pair, ("side_i", "sphere", "radius"), parts["sphere"]["radius"])

@@ -13,6 +13,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.control.controllers import Controller
 from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.run.open_run import OpenRun
+from sphshell_pin.dynamics.scene import models
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
 from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import apparent_mass, find_frame, model_reach, set_joint
@@ -77,9 +78,7 @@ class Drag:
 
         Raises NameNotFound for an unknown frame, InvalidParameter for one that cannot move.
         """
-        where = model.frames[find_frame(model, frame)]
-        if where.parentJoint == 0:
-            raise InvalidParameter("frame", frame, "is fixed to the world: nothing would move")
+        where = model.frames[models.find_moving_frame(model, frame)]
         at = where.placement.act(point)
         mass = apparent_mass(model, q, where.parentJoint, at)
         return cls(frame, point, rate, mass, np.zeros(3))

@@ -176,7 +176,8 @@ class LiveRun:
             end = self._push[2]
             pieces.append(self._advance(max(end - self.time, 0.0), wall))
             if self.time >= end:
-                self._end_push()
+                self._run.push(self.bodies[0], np.zeros(3))
+                self._push = None
         if self.time < until:
             pieces.append(self._advance(until - self.time, wall))
         return Rows.joined(pieces) if pieces else Rows.empty(len(self.scene.pairs))
@@ -389,10 +390,6 @@ class LiveRun:
         seconds = check_not_negative("seconds", seconds, "s")
         self._run.push(body, force)
         self._push, self._drag = (body, force, self.time + seconds), None
-
-    def _end_push(self) -> None:
-        self._run.push(self.bodies[0], np.zeros(3))
-        self._push = None
 
 
 def _exchanged(before: Result, rows: Result, now: Result) -> float:

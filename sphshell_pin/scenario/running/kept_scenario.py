@@ -220,8 +220,10 @@ def _place(kept: Kept, digest: str, suffix: str) -> Path | None:
         content = plain_mesh(suffix, content) or b""
     if not content:
         return None
-    # Named by what it holds: files of all results of a process stand in one folder.
-    place = _folder() / (hashlib.sha256(content).hexdigest() + suffix)
+    # Named by what it holds: files of all results of a process stand in one folder, which stays
+    # until it ends, as meshes are read when drawn.
+    folder = Path(_holder(os.getpid()).name)
+    place = folder / (hashlib.sha256(content).hexdigest() + suffix)
     if not place.exists():
         with atomic_file(place) as stream:
             stream.write(content)
@@ -231,8 +233,3 @@ def _place(kept: Kept, digest: str, suffix: str) -> Path | None:
 @cache
 def _holder(process: int) -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="sphshell-pin-")
-
-
-def _folder() -> Path:
-    """Return a folder that stays until this process ends, as meshes are read when drawn."""
-    return Path(_holder(os.getpid()).name)

@@ -1,12 +1,12 @@
 """A finished run in the scene that it came from, built again."""
 
 import warnings
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import Origin
 from sphshell_pin.dynamics.result.result_scene import check_scene
@@ -42,7 +42,7 @@ class Replay:
         are not those of the run.
     """
 
-    def __init__(self, result: Result | str | PathLike[str]) -> None:
+    def __init__(self, result: Result | StrPath) -> None:
         self.result = result if isinstance(result, Result) else Result.load(result)
         self._name = "the result" if isinstance(result, Result) else str(Path(result))
         with warnings.catch_warnings():

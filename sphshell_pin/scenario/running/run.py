@@ -7,7 +7,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from sphshell_pin import errors
 from sphshell_pin._versions import __version__
 from sphshell_pin.base.atomic.files import held_folder
-from sphshell_pin.base.regular_file import open_regular, read_text
+from sphshell_pin.base.regular_file import StrPath, open_regular, read_text
 from sphshell_pin.base.tables import csv_text
 from sphshell_pin.base.texts import json_text, plain
 from sphshell_pin.dynamics.control.controllers import Controller
@@ -28,8 +27,8 @@ from sphshell_pin.scenario.running.kept_scenario import keep
 
 RECORDING = "recording.html"
 SUMMARY = "summary.json"
-STOPPED = "stopped"
-"""Subfolder for what a run computed that stopped early, beside an earlier one's results."""
+STOPPED = "-stopped"
+"""Ends the name of the folder for what stopped early, beside that of complete results."""
 
 # What a run writes: a later one replaces all of it, so that no folder mixes two runs.
 RESULTS = (
@@ -39,7 +38,6 @@ RESULTS = (
     SUMMARY,
     "force_and_depth.png",
     "energy.png",
-    "contact_path.png",  # of earlier versions
     "contact_map.png",
     "sensors.png",
     RECORDING,
@@ -65,8 +63,8 @@ class RunReport:
 
 
 def run_scenario(
-    name: str | PathLike[str],
-    out: str | PathLike[str] | None = None,
+    name: StrPath,
+    out: StrPath | None = None,
     *,
     changes: Mapping[str, str] | None = None,
     recording: bool = True,
@@ -77,8 +75,8 @@ def run_scenario(
 
     `out` is the folder, results/<name> by default; `changes` are values by dotted key. An
     interrupted or diverged run is written like any other, and `stopped` says so; where the folder
-    has the results of a complete run, it is written to the subfolder `stopped`. Files take the
-    place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
+    has the results of a complete run, it is written to a folder beside it, "NAME-stopped". Files
+    take the place of an earlier run's all at once, when all are on disk (`base.atomic`). Without
     `recording` or `figures` no recording.html or no pictures are made, which take most of the time
     of a short run.
 
@@ -97,7 +95,7 @@ def run_scenario(
 
 def run_built(
     built: Built,
-    out: str | PathLike[str] | None = None,
+    out: StrPath | None = None,
     *,
     recording: bool = True,
     figures: bool = True,
@@ -107,14 +105,15 @@ def run_built(
     check_expectations(built)
     folder = Path("results") / built.name if out is None else Path(out)
     with contextlib.ExitStack() as held:
-        place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
+        place = held.enter_context(held_folder(folder, SUMMARY))
         result, stopped = simulate(built, progress)
         verdicts, fault = _judge(built, result) if stopped is None else ((), None)
         notes: list[str] = []
         if stopped is not None and _holds_complete(folder):
             notes.append(f"the complete results of an earlier run stay in {folder}")
-            folder = folder / STOPPED
-            place = held.enter_context(held_folder(folder, SUMMARY, [STOPPED]))
+            named = folder if folder.name else folder.absolute()
+            folder = named.with_name(named.name + STOPPED)
+            place = held.enter_context(held_folder(folder, SUMMARY))
         try:
             staging = place.staging()
             result.save(staging / "run.npz", home=folder)
@@ -128,7 +127,9 @@ def run_built(
                 notes.append(f"{RECORDING} of an earlier run was removed: this run wrote none")
             place.replace(staging, RESULTS)
         except OSError as error:
-            raise _not_written(folder, error) from None
+            cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
+            reason = f"the results cannot be written: {cause.strerror or cause}"
+            raise errors.ResultError(folder, reason) from None
     if fault is not None:
         raise fault
     if interrupted:
@@ -195,11 +196,6 @@ def origin_of(built: Built) -> Origin:
         {key: plain(value) for key, value in settings},
         partial(keep, built.scenario, folder, built.assembly.loaded, dict(built.shells)),
     )
-
-
-def _not_written(folder: Path, error: OSError) -> errors.ResultError:
-    cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
-    return errors.ResultError(folder, f"the results cannot be written: {cause.strerror or cause}")
 
 
 def _holds_complete(folder: Path) -> bool:

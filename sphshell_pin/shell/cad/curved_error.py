@@ -113,12 +113,9 @@ class _Places:
         self._curves.seal()
         self._flat_points = np.einsum("kc,tcx->tkx", WEIGHTS, self.corners)
         # Measured last: where, nan where nowhere yet; and how far off.
-        self._curved = np.full_like(self._flat_points, np.nan), self._none()
+        off = np.zeros((len(self.corners), 3))
+        self._curved = np.full_like(self._flat_points, np.nan), Errors(off, off[:, 0], off)
         self._flat = self._curved
-
-    def _none(self) -> Errors:
-        count = len(self.corners)
-        return Errors(np.zeros((count, 3)), np.zeros(count), np.zeros((count, 3)))
 
     def errors(self, shell: ShellBase) -> Errors:
         """Measure the curved elements of `shell`, whose triangles are those of the surface."""

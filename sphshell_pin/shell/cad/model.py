@@ -22,6 +22,7 @@ from OCP.TopExp import TopExp, TopExp_Explorer
 from OCP.TopoDS import TopoDS, TopoDS_Compound
 
 from sphshell_pin import errors
+from sphshell_pin.base.summary import names as listed
 from sphshell_pin.shell.cad.options import Occ
 from sphshell_pin.units import METERS_PER_UNIT, meters_per_unit
 
@@ -115,7 +116,7 @@ def take_unit(
         if not names:
             raise errors.UnitMissing(path, size, METERS_PER_UNIT)
         if len(names) > 1:
-            note = f"units {_listed(names)} from the file's header, each for its own part"
+            note = f"units {listed(names)} from the file's header, each for its own part"
             return header, "mm", note
         return header, names[0], f"unit '{names[0]}' from the file's header"
     stated = meters_per_unit(unit)
@@ -125,7 +126,7 @@ def take_unit(
         raise errors.InvalidParameter(
             "unit",
             unit,
-            f"cannot take the place of the {len(names)} units {_listed(names)} that {path.name} "
+            f"cannot take the place of the {len(names)} units {listed(names)} that {path.name} "
             "states, each for its own part: leave it out",
         )
     if math.isclose(stated, header.meters, rel_tol=SAME):
@@ -144,10 +145,6 @@ def _called(meters: float) -> str:
     """Name of a unit, its length if it has none."""
     known = (name for name, one in METERS_PER_UNIT.items() if math.isclose(one, meters))
     return next(known, f"{meters:.9g} m")
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    return ", ".join(f"'{name}'" for name in names)
 
 
 LARGEST = 1

@@ -1,32 +1,25 @@
 """Surface files: which reader takes which suffix."""
 
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 from sphshell_pin.base.checks import check_type
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.errors import InvalidParameter, ShellFileError
 from sphshell_pin.shell.cad.options import CAD_SUFFIXES
-from sphshell_pin.shell.raw import RawSurface
 from sphshell_pin.shell.readers.mesh import read_obj, read_off, read_stl
 from sphshell_pin.shell.readers.ply import read_ply
 from sphshell_pin.shell.readers.shl import read_shl
 
 __all__ = ["READERS", "read_obj", "read_off", "read_ply", "read_shl", "read_stl", "reader_for"]
 
-READERS: dict[str, Callable[[Path], RawSurface]] = {
-    ".stl": read_stl,
-    ".obj": read_obj,
-    ".ply": read_ply,
-    ".off": read_off,
-}
+READERS = {".stl": read_stl, ".obj": read_obj, ".ply": read_ply, ".off": read_off}
 """Readers of formats that carry no unit; .shl carries one and has a reader of its own."""
 
 SUFFIXES = (*READERS, ".shl", *CAD_SUFFIXES)
 
 
-def reader_for(path: str | os.PathLike[str]) -> tuple[Path, str]:
+def reader_for(path: StrPath) -> tuple[Path, str]:
     """Return the path and its suffix in lower case, after a check that such a file can be read.
 
     Raises

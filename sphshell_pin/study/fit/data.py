@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.regular_file import read_text
+from sphshell_pin.base.regular_file import StrPath, read_text
 from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.base.texts import number_of
 from sphshell_pin.errors import DataError, InvalidParameter, NameNotFound
 from sphshell_pin.study.fit.units import factor_to_si
 
-Source = str | PathLike[str] | Mapping[str, ArrayLike]
+Source = StrPath | Mapping[str, ArrayLike]
 
 TIME, SIGMA = "t", ".sigma"
 # A time may be so much beyond the end of a run, as a part of it, for having been rounded.

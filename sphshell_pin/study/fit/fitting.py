@@ -2,11 +2,11 @@
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format import reading
 from sphshell_pin.scenario.format.build import build_scenario
@@ -21,7 +21,7 @@ Data = Source | Experiment | Sequence[Source | Experiment]
 
 
 def fit(
-    scenario: str | PathLike[str],
+    scenario: StrPath,
     data: Data,
     parameters: Wanted,
     *,
@@ -73,11 +73,7 @@ def fit(
 
 
 def _trials(
-    base: Scenario,
-    path: Path,
-    free: Sequence[Free],
-    data: Data,
-    columns: Collection[str] | None,
+    base: Scenario, path: Path, free: Sequence[Free], data: Data, columns: Collection[str] | None
 ) -> list[Trial]:
     several = isinstance(data, Sequence) and not isinstance(data, str)
     given: Sequence[Source | Experiment] = data if several else [data]  # type: ignore[list-item, assignment]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +13,7 @@ from scipy import stats
 
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import write_whole
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.base.summary import Fact, Summarized
 from sphshell_pin.base.texts import json_text
 from sphshell_pin.scenario.format.reading import find_scenario
@@ -120,9 +120,7 @@ class Fit(Summarized):
 
         return plot_fit(self)
 
-    def write_scenario(
-        self, path: str | PathLike[str], changes: Mapping[str, str] | None = None
-    ) -> Path:
+    def write_scenario(self, path: StrPath, changes: Mapping[str, str] | None = None) -> Path:
         """Write the scenario's file with the fitted values, and `changes`, in place.
 
         Comments stay; names of files beside the scenario are written relative to the new place.

@@ -9,16 +9,9 @@ import numpy as np
 from scipy import optimize, stats
 
 import sphshell_pin as sp
+from sphshell_pin import errors
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics.sensing.sensors import Sensor
-from sphshell_pin.errors import (
-    DataError,
-    Interrupted,
-    SetupWarning,
-    SphshellError,
-    UnitWarning,
-    WeakLawWarning,
-)
 from sphshell_pin.scenario.format.build import Built, rebuild
 from sphshell_pin.scenario.format.reading import change_scenario, look_up
 from sphshell_pin.scenario.format.sliders import meaning
@@ -54,7 +47,8 @@ class Trial:
     ) -> dict[str, tuple[str, Array]]:
         """Return unit and values (n,) at the times `t` (n,) of what `quantities_of` finds."""
         with warnings.catch_warnings():
-            for kind in (WeakLawWarning, SetupWarning, UnitWarning):  # said of the fitted values
+            # Said of the fitted values.
+            for kind in (errors.WeakLawWarning, errors.SetupWarning, errors.UnitWarning):
                 warnings.simplefilter("ignore", kind)
             built = rebuild(self.built, changes or {}, anew=True)
             sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
@@ -81,7 +75,7 @@ class Trial:
         for one in self.data:
             parts.append(found[one.name][1][np.searchsorted(t, one.t)])
             for row in np.flatnonzero(np.isnan(parts[-1])):
-                raise DataError(
+                raise errors.DataError(
                     one.experiment,
                     f"no reading of '{one.name}' has arrived at {one.t[row]:.6g} s: the sensor's "
                     "first one comes later",
@@ -114,7 +108,7 @@ class Search:
         """Search; weights that are not given are estimated from the residuals, and it goes on."""
         try:
             self._known[self.x.tobytes()] = self._run(self.x)
-        except SphshellError as fault:
+        except errors.SphshellError as fault:
             fault.add_note("this is the run at the start values")
             raise
         self._settle()
@@ -216,9 +210,9 @@ class Search:
         if key not in self._known:
             try:
                 self._known[key] = self._run(x)
-            except Interrupted:
+            except errors.Interrupted:
                 raise
-            except SphshellError:
+            except errors.SphshellError:
                 self._known[key] = np.full(len(self.measured), np.nan)
         return self._known[key]
 

@@ -1,7 +1,8 @@
 """A scenario's file with other values in place; comments and order stay."""
 
 import os
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +35,13 @@ def scenario_text(source: Path, changes: Mapping[str, str], folder: Path) -> str
         keys = ", ".join(changes)
         raise ScenarioError(source, keys, "cannot be written into the file: state the keys in it")
     here, there = source.parent.absolute(), folder.absolute()
-    if here != there:
-        named = files_of(before) | {one for robot in before.robot for one in robot.package_dirs}
-        _move(document, named, os.path.relpath(here, there))
-    return str(document.as_string())
+    named = files_of(before) | {one for robot in before.robot for one in robot.package_dirs}
+    moved = [re.escape(one) for one in named if here != there and not os.path.isabs(one)]
+    if not moved:
+        return written
+    # Between quotes, or before the name of a function.
+    pattern, way = rf"""(?<=["'])(?:{"|".join(moved)})(?=["':])""", os.path.relpath(here, there)
+    return re.sub(pattern, lambda one: os.path.normpath(os.path.join(way, one[0])), written)
 
 
 def _value(text: str) -> Any:
@@ -46,15 +50,3 @@ def _value(text: str) -> Any:
         return tomlkit.value(text)
     except ValueError:
         return text
-
-
-def _move(node: Any, named: Collection[str], way: str) -> None:
-    """Put `way` before the relative names of files among the texts of a table or list."""
-    for key, value in node.items() if isinstance(node, dict) else enumerate(node):
-        if isinstance(value, dict | list):
-            _move(value, named, way)
-        elif isinstance(value, str):
-            file, colon, function = value.partition(":") if ".py:" in value else (value, "", "")
-            if file in named and not os.path.isabs(file):
-                moved = os.path.normpath(os.path.join(way, file))
-                node[key] = Path(moved).as_posix() + colon + function

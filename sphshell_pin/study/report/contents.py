@@ -17,6 +17,7 @@ import numpy as np
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.tables import csv_text
 
+Sense = Literal["<=", ">="]
 Progress = Callable[[float], None]
 """Called with the share of a section that is done, 0 to 1."""
 Value = str | float | None
@@ -51,16 +52,11 @@ class Finding:
     low: float | None = None
     high: float | None = None
     aim: float | None = None
-    sense: Literal["<=", ">="] = "<="
+    sense: Sense = "<="
 
     @classmethod
     def of_rounds(
-        cls,
-        key: str,
-        what: str,
-        ratios: Array,
-        aim: float | None = None,
-        sense: Literal["<=", ">="] = "<=",
+        cls, key: str, what: str, ratios: Array, aim: float | None = None, sense: Sense = "<="
     ) -> Finding:
         """Return the median of the ratios (rounds,) of every round, with its quartiles."""
         median, low, high = Spread.of(ratios)

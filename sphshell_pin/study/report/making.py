@@ -89,7 +89,7 @@ def make_report(
 
 
 def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
-    begin, load = time.perf_counter(), os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
+    begin, load = time.perf_counter(), os.getloadavg()[0]
     machine = describe(command)
     whole = sum(part.seconds[not quick] for part in parts)
     sections, done = [], 0.0

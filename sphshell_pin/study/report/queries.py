@@ -14,17 +14,7 @@ import numpy as np
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array, Ints
 from sphshell_pin.shell.primitives import coal_tree
-from sphshell_pin.study.report.contents import (
-    TIME_COLUMNS,
-    Finding,
-    Progress,
-    Section,
-    Spread,
-    Table,
-    about,
-    columns,
-    number,
-)
+from sphshell_pin.study.report import contents
 from sphshell_pin.study.report.convergence import query_contestant
 from sphshell_pin.study.report.surfaces import touching_centers, wavy_sheet
 from sphshell_pin.study.report.timing import part, per_center, take_turns
@@ -36,7 +26,7 @@ FEW, COMPARED, MANY = 32, 316, 1000
 SIDE = 1 / 316  # of a cell [m]
 CENTERS, COAL_CENTERS = 20_000, 2000
 OURS, FLAT, COAL = "smooth", "facets", "coal::collide"
-TEXT = about(__doc__)
+TEXT = contents.about(__doc__)
 Times = dict[tuple[str, int], Array]
 """Times of a query [s] (rounds,) by the code and the number of triangles."""
 
@@ -56,7 +46,7 @@ def coal_contestant(vertices: Array, triangles: Ints, centers: Array) -> Callabl
     return per_center(ask, len(centers))
 
 
-def measure(cells: tuple[int, ...], rounds: int, progress: Progress) -> Times:
+def measure(cells: tuple[int, ...], rounds: int, progress: contents.Progress) -> Times:
     """Return the times of a query on sheets of so many cells; Coal's on COMPARED alone."""
     contestants = {}
     for k, count in enumerate(cells):
@@ -71,13 +61,13 @@ def measure(cells: tuple[int, ...], rounds: int, progress: Progress) -> Times:
     return take_turns(contestants, rounds, part(progress, 0.5, 1.0))
 
 
-def section(*, quick: bool, progress: Progress) -> Section:
+def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section; `quick` leaves out the largest sheet."""
     cells = (FEW, COMPARED) if quick else (FEW, COMPARED, MANY)
     return assemble(measure(cells, 5 if quick else 15, progress))
 
 
-def assemble(times: Times) -> Section:
+def assemble(times: Times) -> contents.Section:
     """Return the section of what was measured."""
     sizes = sorted({triangles for _, triangles in times})
     compared = 2 * COMPARED**2
@@ -86,20 +76,21 @@ def assemble(times: Times) -> Section:
     what = "query, 200 k triangles: "
     coal_collide = f"{what}time of coal::collide with all contacts / ours"
     facets = 'the same with the method "facets" in place of "smooth", the default'
-    growth = f"query at equal contact patch: {number(sizes[-1])} / {number(sizes[0])} triangles"
-    ratio = Finding.of_rounds
+    grew = " / ".join(map(contents.number, (sizes[-1], sizes[0])))
+    growth = f"query at equal contact patch: {grew} triangles"
+    ratio = contents.Finding.of_rounds
     findings = [
         ratio("query_coal", coal_collide, theirs / ours, 15.0, ">="),
         ratio("query_coal_facets", facets, theirs / flat),
         ratio("query_growth", growth, grown, aim=4.0),
         ratio("query_smooth", f"{what}curved elements / flat ones", ours / flat, aim=1.5),
     ]
-    table = Table(
+    table = contents.Table(
         "queries",
         "Time of a query.",
-        columns("code", "triangles", TIME_COLUMNS),
-        [(name, triangles, *Spread.of(t)) for (name, triangles), t in times.items()],
+        contents.columns("code", "triangles", contents.TIME_COLUMNS),
+        [(name, triangles, *contents.Spread.of(t)) for (name, triangles), t in times.items()],
     )
-    left_out = f"--quick leaves out {number(2 * MANY**2)} triangles."
+    left_out = f"--quick leaves out {contents.number(2 * MANY**2)} triangles."
     notes = [] if sizes[-1] == 2 * MANY**2 else [left_out]
-    return Section(KEY, TITLE, TEXT, findings=findings, tables=[table], notes=notes)
+    return contents.Section(KEY, TITLE, TEXT, findings=findings, tables=[table], notes=notes)

@@ -5,12 +5,12 @@
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from os import PathLike
 
 import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.checks import check_finite, check_positive
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import FrameNotFound, MissingExtra, NameNotFound, SphshellError
 from sphshell_pin.robots import RobotError
 from sphshell_pin.study.robot_check.checks import QUICK, SPEED, Sizes, run_checks
@@ -22,12 +22,12 @@ __all__ = ["QUICK", "RobotReport", "Sizes", "Touch", "check_robot", "contact_sce
 
 
 def check_robot(
-    robot: str | PathLike[str] | pin.Model,
+    robot: StrPath | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,
     free_flyer: bool = False,
-    package_dirs: Sequence[str | PathLike[str]] = (),
+    package_dirs: Sequence[StrPath] = (),
     xacro_args: Mapping[str, object] | None = None,
     density: float | None = None,
     mimic: bool = True,
@@ -97,7 +97,7 @@ def check_robot(
 
 
 def contact_scene(
-    robot: str | PathLike[str] | pin.Model,
+    robot: StrPath | pin.Model,
     *,
     frame: str | None = None,
     radius: float | None = None,

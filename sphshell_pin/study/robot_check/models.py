@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from sphshell_pin import robots
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.regular_file import why_no_file
+from sphshell_pin.base.regular_file import StrPath, why_no_file
 from sphshell_pin.errors import InvalidParameter, NameNotFound, SphshellError
 
 
@@ -43,10 +43,10 @@ def check_known(names: Iterable[str]) -> None:
 
 
 def load_subject(
-    robot: str | PathLike[str] | pin.Model,
+    robot: StrPath | pin.Model,
     *,
     free_flyer: bool = False,
-    package_dirs: Sequence[str | PathLike[str]] = (),
+    package_dirs: Sequence[StrPath] = (),
     xacro_args: Mapping[str, object] | None = None,
     density: float | None = None,
     mimic: bool = True,
@@ -139,9 +139,3 @@ def _without_meshes(
     )
     robot = robots.exactly(robot, description, mimic=mimic, warn=False)
     return Subject(name, robot, shipped, robot.notes)
-
-
-def listed(names: list[str], most: int = 4) -> str:
-    """Return the names in quotes; of more than `most` the first, and how many there are."""
-    text = ", ".join(f"'{name}'" for name in names[:most])
-    return f"{text}, ... ({len(names)} of them)" if len(names) > most else text

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array, frame_along
+from sphshell_pin.base.summary import names
 from sphshell_pin.contact import CoulombFriction, ImpactLaw, NormalLaw, Sphere
 from sphshell_pin.dynamics import Scene
 from sphshell_pin.dynamics.scene.mimic import mimics, with_mimics
@@ -15,8 +16,9 @@ from sphshell_pin.dynamics.scene.models import find_frame, mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.inertia import lacks_masses, mass_fault
 from sphshell_pin.shell import Shell
+from sphshell_pin.study.report.surfaces import wavy_sheet
 from sphshell_pin.study.robot_check import probe_spheres
-from sphshell_pin.study.robot_check.models import Subject, listed
+from sphshell_pin.study.robot_check.models import Subject
 from sphshell_pin.study.robot_check.postures import massless_joints, random_posture, regularity
 from sphshell_pin.testing.forces import point_jacobian
 
@@ -79,36 +81,30 @@ def setting_of(
         model = Scene(model, lock=held, q_lock=postures[0]).model
         notes.append(
             "joints that move no mass are held here, as `lock` does it in a scene, because forward "
-            f"dynamics has no answer for them: {listed(held)}"
+            f"dynamics has no answer for them: {names(held)}"
         )
     try:
-        tip, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
-        sphere, shifted = probe_spheres.moved_sphere(model, tip, rng)
+        sphere, said = probe_spheres.find_sphere(subject, model, rng, frame, radius)
     except SphshellError:
         robot = subject.robot
         fault = mass_fault(robot.model, postures[0], robot.description) if held else None
         if fault is None:
             raise
         raise SphshellError(fault) from None
-    notes += said + shifted
+    notes += said
     if any(model.armature[one.idx_v] for one in model.joints if _flies(one)):
         notes.append(
             "the file gives its free joint an armature, an inertia without momentum, which is left "
             "out where momentum is checked: make it a <freejoint/>, which takes no defaults"
         )
-    return Setting(model, sphere, patch(tip.radius), tuple(notes))
+    return Setting(model, sphere, patch(sphere.radius), tuple(notes))
 
 
 def patch(radius: float) -> Shell:
     """Return a wavy patch (800 triangles, exact normals) round the origin, z up, for `radius`."""
-    at = np.linspace(-_HALF, _HALF, _CELLS + 1) * radius
-    x, y = (one.ravel() for one in np.meshgrid(at, at, indexing="ij"))
+    vertices, triangles = wavy_sheet(_CELLS, 2.0 * _HALF * radius)
+    x, y, _ = vertices.T
     z, normals = _wave(x, y, radius)
-    number = np.arange((_CELLS + 1) ** 2).reshape(_CELLS + 1, _CELLS + 1)
-    a, b, c, d = (
-        one.ravel() for one in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
-    )
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return Shell(np.stack([x, y, z], 1), triangles, normals=normals, name="patch")
 
 

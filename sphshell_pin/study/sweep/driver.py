@@ -8,12 +8,12 @@ import time
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
 from functools import partial
-from os import PathLike
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from sphshell_pin.base.atomic import atomic_file
+from sphshell_pin.base.atomic.file import atomic_file, check_writable
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter, ResultError, SweepError, import_extra
 from sphshell_pin.study.sweep import worker
 from sphshell_pin.study.sweep.indices import DESIGN, figures_of
@@ -33,13 +33,13 @@ _need = partial(import_extra, extra="sweep", purpose="a sweep")
 
 
 def sweep(
-    scenario: str | PathLike[str],
+    scenario: StrPath,
     vary: Vary | Iterable[str] | None = None,
     *,
     changes: Mapping[str, str] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
-    out: str | PathLike[str] | None = None,
+    out: StrPath | None = None,
     progress: Progress | None = None,
     dist: Dist | Iterable[str] | None = None,
     n: int | None = None,
@@ -103,7 +103,7 @@ def run_plan(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
-    out: str | PathLike[str] | None = None,
+    out: StrPath | None = None,
     progress: Progress | None = None,
 ) -> pd.DataFrame:
     """Do what the table at `out` does not hold yet, and write the table; see `sweep`."""
@@ -200,15 +200,7 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
     if path.suffix.lower() != ".parquet":
         raise InvalidParameter("out", str(path), "must end in .parquet")
     _need("pyarrow")
-    if path.is_dir():
-        raise ResultError(path, "is a folder: give another --out")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        (path.parent / f".{path.name}.try").touch()
-        (path.parent / f".{path.name}.try").unlink()
-    except OSError as fault:
-        why = f"the folder cannot be written: {fault.strerror}; give another with --out"
-        raise ResultError(path.parent, why) from None
+    check_writable(path)
     if not path.exists() or not path.stat().st_size:
         return {}
     try:

@@ -1,17 +1,14 @@
 """What a sweep will do: its runs, checked before anything is computed."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from os import PathLike
 from pathlib import Path
 
-from sphshell_pin.base.regular_file import open_regular
+from sphshell_pin.base.regular_file import StrPath, open_regular
 from sphshell_pin.errors import InvalidParameter, ScenarioError, SphshellError
 from sphshell_pin.scenario import Built, Scenario, find_scenario, read_scenario, shipped_scenarios
 from sphshell_pin.scenario.format.build import build_scenario
@@ -63,7 +60,7 @@ class Plan:
 
 
 def plan_sweep(
-    scenario: str | PathLike[str],
+    scenario: StrPath,
     vary: Vary | Iterable[str] | None = None,
     *,
     changes: Changes | None = None,

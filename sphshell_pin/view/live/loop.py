@@ -260,7 +260,8 @@ class Live:
                 self._check_can_go_on()
                 self._advance(min(event["seconds"], LONGEST_STEP), 20 * BUDGET)
             case "reset":
-                self._reset()
+                self.player.reset()
+                self._start_anew()
             case "speed":
                 self.speed = min(max(event["value"], panel.SLOWEST), panel.FASTEST)
                 self._pace.clear()
@@ -311,10 +312,6 @@ class Live:
             return self.player.ended
         known = isinstance(self.fault, SphshellError)
         return str(self.fault) if known else f"{type(self.fault).__name__}: {self.fault}"
-
-    def _reset(self) -> None:
-        self.player.reset()
-        self._start_anew()
 
     def _start_anew(self) -> None:
         self.fault = None

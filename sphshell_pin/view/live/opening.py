@@ -14,10 +14,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sphshell_pin.base.regular_file import StrPath
 from sphshell_pin.errors import InvalidParameter, ResultError
 from sphshell_pin.view.live.loop import Live
 from sphshell_pin.view.live.panel import check_speed
-from sphshell_pin.view.surface import Coloring, check_coloring
 
 if TYPE_CHECKING:
     from sphshell_pin.view.live.player import Player
@@ -34,7 +34,7 @@ def preview(
     host: str = "127.0.0.1",
     port: int = 0,
     open: bool = True,
-    color: Coloring = "surface",
+    faces: bool = False,
     told: Callable[[str], object] = print,
 ) -> None:
     """Show `what` in a live page until Ctrl-C.
@@ -53,24 +53,22 @@ def preview(
         Where the page is served; port 0 takes any that is free.
     open
         Open the page in the web browser, where there is a screen.
-    color
-        What the colors of the shells show: nothing ("surface") or the kinds of their faces
-        ("faces"). The page can change it.
+    faces
+        Color the shells by the kinds of their faces. The page can change it.
     told
         Called with the page's address, which ends with a token and gives access.
 
     Raises
     ------
     SphshellError
-        `what` cannot be built or read, the port is taken, or `color` is none of these.
+        `what` cannot be built or read, or the port is taken.
     """
     check_speed(speed)  # before anything is built
-    check_coloring(color)
     player = player_of(what, changes=changes)
     _warn(player)
     live = Live(player, host=host, port=port, speed=speed, running=not paused, wait=True)
-    if color != "surface":
-        live.picture.show(color, True)
+    if faces:
+        live.picture.show("faces", True)
     try:
         told(live.url)
         if live.server.is_open:
@@ -114,7 +112,7 @@ def player_of(what: object, *, changes: Mapping[str, str] | None = None) -> Play
     )
 
 
-def result_file(what: str | PathLike[str]) -> Path | None:
+def result_file(what: StrPath) -> Path | None:
     """Return the file of the finished run that `what` names; None if it names a scenario.
 
     Raises ResultError for a folder without one.
@@ -156,6 +154,6 @@ def open_file(path: Path) -> None:
 
 
 def _on_a_screen() -> bool:
-    return sys.platform in ("darwin", "win32") or any(
+    return sys.platform == "darwin" or any(
         os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
     )
