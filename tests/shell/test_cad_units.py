@@ -9,6 +9,7 @@ pytest.importorskip("OCP")
 
 from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
+from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
 
 SIDES = np.array([20.0, 30.0, 10.0])
@@ -123,6 +124,13 @@ def test_several_units_hold_for_their_own_parts(step, written):
     assert any("units 'mm', 'in' from the file's header" in note for note in notes)
     with pytest.raises(InvalidParameter, match=r"the 2 units 'mm', 'in' that part\.step states"):
         Shell.from_file(path, "mm")
+
+
+def test_units_without_a_name_are_converted_to_one(step, written, tmp_path):
+    path = written(with_unit(step, converted("FURLONG", "201168.")))
+    done = convert(path, tmp_path / "out.ply")
+    assert done.target.unit == "mm"
+    assert done.target.size == pytest.approx(done.source.size, rel=1e-12)
 
 
 def with_header(iges, unit, delimiter=",", ends=";"):
