@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.result.run_stats import JointFigures
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.errors import NameNotFound
 from sphshell_pin.scenario.format.build import build
@@ -179,6 +180,16 @@ def test_the_fastest_of_a_joint_s_directions_counts() -> None:
     figures = result.stats.joints["ball_joint"]
     assert figures.peak_speed == pytest.approx(3.0, rel=1e-12)
     assert figures.first_too_fast == 0.0
+
+
+def test_of_several_limits_of_a_joint_the_first_cut_and_the_greatest_speed_count() -> None:
+    """Of a planar joint: -1 is never."""
+    times = {"cut_time": 0.1, "first_cut": 0.4, "peak_speed": 2.0, "first_too_fast": -1.0}
+    other = {"cut_time": 0.3, "first_cut": 0.2, "peak_speed": 1.0, "first_too_fast": 0.7}
+    for limits in ([times, other], [other, times]):
+        figures = JointFigures.from_core([], limits)
+        assert (figures.cut_time, figures.first_cut) == (0.3, 0.2)
+        assert (figures.peak_speed, figures.first_too_fast) == (2.0, 0.7)
 
 
 def test_events_of_limits_name_the_joint_that_met_them() -> None:
