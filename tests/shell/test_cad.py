@@ -159,14 +159,14 @@ def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
     path = tmp_path / f"part{suffix}"
     whole = WRITERS[suffix](path, shapes.box()).read_bytes()
     capfd.readouterr()
-    for data, told in (
+    for data, message in (
         (b"", "is empty"),
         (b"this is no CAD file\n", "does not begin as one"),
         (whole[: len(whole) // 2], "is truncated"),
         (bytes(range(256)) * 20, "does not begin as one"),
     ):
         path.write_bytes(data)
-        with pytest.raises(errors.ShellFileError, match=told):
+        with pytest.raises(errors.ShellFileError, match=message):
             Shell.from_file(path, "mm")
     assert capfd.readouterr() == ("", "")
 

@@ -32,10 +32,8 @@ def find_sphere(
     `model` is the robot's without the joints that are held. A sphere that no joint moves well is
     put off its place.
     """
-    tip, notes = (
-        find_tips(subject.robot, shipped=subject.shipped, frame=frame, radius=radius)[0],
-        [],
-    )
+    tip = find_tips(subject.robot, shipped=subject.shipped, frame=frame, radius=radius)[0]
+    notes: list[str] = []
     size, least = tip.radius, _LEAST
     if frame is None and radius is None and size < _DUMMY:
         size = float(np.clip(0.02 * model_reach(model), *_RADII))
