@@ -29,8 +29,8 @@ def find_sphere(
 ) -> tuple[Sphere, list[str]]:
     """Return the sphere to check with, and notes where it is not the fingertip that is known.
 
-    `model` is the robot's without the joints that are held. A sphere that no joint moves well is
-    put off its place.
+    `model` is the robot's without the joints that are held, `radius` [m] that of the sphere. One
+    that joints hardly move is put off its place; SphshellError if that does not help.
     """
     tip = find_tips(subject.robot, shipped=subject.shipped, frame=frame, radius=radius)[0]
     notes: list[str] = []

@@ -23,7 +23,7 @@ struct CurvedSegment {
   int index_v, index_q;
 
   // Its parts of what has a velocity's numbers from `first` on, as vectors in space: the plane is
-  // z = 0. Sizes that are known when it runs alone would take 7 % of a free body's step.
+  // z = 0. Sizes that only the run knows would take 4 % more of a free body's step.
   Eigen::Vector3d linear_of(const VectorX& x, int first = 0) const {
     const double* from = x.data() + first + index_v;
     if (linear == 3) return Eigen::Map<const Eigen::Vector3d>(from);
