@@ -87,6 +87,22 @@ def test_a_damped_stop_throws_back_at_its_restitution(integrator) -> None:
     assert residual(result) < 1e-7
 
 
+def test_a_top_without_torque_turns_as_the_closed_form_to_rounding() -> None:
+    """Steps of so small turns that the chart of rotations is near its origin, by its series."""
+    along, across = 2e-3, 1e-3
+    model = models.empty(gravity=0.0)
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([across, across, along]))
+    models.add_body(model, "top", pin.JointModelFreeFlyer(), inertia=inertia)
+    w = np.array([7.0, 1.0, 7.0])
+    q, v = models.free_q(np.zeros(3)), np.concatenate([np.zeros(3), w])
+    result = models.run(sp.Scene(model), sp.RungeKutta4(9e-5), q, v, 0.3)
+    momentum, t = np.array([across, across, along]) * w, result.t[-1]
+    precession = pin.exp3(momentum / across * t)
+    spin = pin.exp3(np.array([0.0, 0.0, (across - along) / across * w[2] * t]))
+    turned = pin.Quaternion(result.q[-1][3:]).matrix()
+    np.testing.assert_allclose(turned, precession @ spin, rtol=0, atol=2e-13)
+
+
 def test_damping_and_armature_decay_as_the_closed_form() -> None:
     joints = {"damping": {"hinge": 0.3}, "armature": {"hinge": 0.05}}
     result = swing(joints, sp.Adaptive(1e-11, 1e-13), 0.0, 1.0, 2.0)

@@ -3,12 +3,16 @@
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
+from sphshell_pin.scenario.drafting.limb_ends import Tip
+from sphshell_pin.scenario.drafting.placing import Place
+from sphshell_pin.scenario.drafting.poses import Limb, Stance
 from sphshell_pin.scenario.drafting.searching import CannotReach, NewScenario
 from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
-from tests import urdf
+from tests import models, urdf
 from tests.scenario.limbs import ball, limb, link
 from tests.urdf import shape
 
@@ -29,6 +33,39 @@ def settled(made: NewScenario) -> float:
     log = result.contacts
     last = log.normal_force[log.row == len(result.t) - 1]
     return float(last.sum() / made.built.scenario.controller.normal_force)
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0, 10.0])
+def test_a_path_ends_before_a_joint_has_to_turn_fast_whatever_the_size(size: float) -> None:
+    """To a place beside the axis of an arm's first joint, which turns the faster the nearer."""
+    model = models.arm()
+    model.upperPositionLimit[:] = 3.0
+    model.lowerPositionLimit[:] = -3.0
+    for joint in range(1, 4):
+        placement = model.jointPlacements[joint]
+        placement.translation = size * placement.translation
+    tip = Tip("ball", 0.01 * size, np.array([0.0, 0.0, 0.0]), "")
+    model.frames[model.getFrameId("ball")].placement.translation *= size
+    stance = Stance(Limb(model, tip), np.array([0.0, 1.2, 1.0]), np.array([0.0, 0.0, -1.0]))
+    beside = np.array([0.0, 0.02 * size, stance.center[2]])
+    way = stance.center + np.linspace(0.0, 1.0, 41)[:, None] * (beside - stance.center)
+    assert stance.follows(way, lambda _: True) == (37, "its joints do not reach farther there")
+
+
+@pytest.mark.parametrize(
+    ("turn", "raised", "told"),
+    [
+        (0.0, 0.0, "upright, as in its file, on the floor of the robot's base"),
+        (np.pi / 2, 5e-5, "with its +x side towards the tip, on the floor of the robot's base"),
+        (0.0, 0.02, "upright, as in its file, 20 mm above the floor of the robot's base: there"),
+        (0.0, -0.02, "upright, as in its file, 20 mm below the floor of the robot's base: there"),
+    ],
+)
+def test_how_a_part_stands_is_told(turn: float, raised: float, told: str) -> None:
+    placement = pin.SE3(pin.utils.rotate("y", turn), np.zeros(3))
+    # What does not tell is left out.
+    place = Place(None, None, placement, True, raised, np.array([1.0, 0.0, 0.0]))  # type: ignore
+    assert place.told.startswith(f"the surface stands {told}")
 
 
 @pytest.mark.parametrize("tilts", [False, True])

@@ -1,5 +1,6 @@
 """CAD files: what is read, what it is called, in which unit, and what is refused."""
 
+import re
 import sys
 
 import numpy as np
@@ -138,6 +139,23 @@ def test_faces_written_one_by_one_are_joined(tmp_path):
     path = shapes.write_iges(tmp_path / "loose.iges", shapes.rounded_box())
     expect(Shell.from_file(path).health, "joined within", is_closed=True)
     assert "joined within" not in " ".join(Shell.from_file(path, sew=0).health.notes)
+
+
+@pytest.mark.parametrize(("solids", "entity"), [(0, 144), (1, 510)])
+def test_a_face_that_lost_its_surface_is_told_and_the_others_stay(solids, entity, tmp_path):
+    """OpenCASCADE makes an endless face of it, which is not to decide on the size of the part."""
+    path = shapes.write_iges(tmp_path / "box.iges", shapes.rounded_box(), solids=solids)
+    text, whole = path.read_text(), Shell.from_file(path)
+    surface = re.compile(rf"(?<=^{entity},)\d+", re.M)
+    path.write_text(surface.sub(lambda number: "0" * len(number[0]), text, count=1))
+    rest, faces = Shell.from_file(path), len(surface.findall(text))
+    expect(rest.health, f"1 of the {faces} faces of the file could not be read")
+    assert rest.size == pytest.approx(whole.size)
+    assert 0.8 < len(rest.triangles) / len(whole.triangles) < 1
+    if not solids:
+        path.write_text(surface.sub(lambda number: "0" * len(number[0]), text))
+        with pytest.raises(errors.ShellFileError, match=f"{faces} of the {faces} faces"):
+            Shell.from_file(path)
 
 
 WRITERS = {

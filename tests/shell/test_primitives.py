@@ -68,6 +68,8 @@ def test_round_solids(name, share, segments):
 @pytest.mark.parametrize("name", ["sphere", "capsule", "thin capsule", "ellipsoid"])
 def test_corner_normals_of_smooth_solids(name):
     shell = Shell.from_geometry(ROUND[name], segments=24)
+    # Half as many rows from pole to pole as round it, and one along the side of a capsule.
+    assert len(shell.triangles) == 2 * 24 * (12 if name.endswith("capsule") else 11)
     points, normals = shell.vertices[shell.triangles].reshape(-1, 3), shell.normals.reshape(-1, 3)
     # Only along the true normal does the depth change by as much as the step.
     step = 1e-7

@@ -89,6 +89,18 @@ def test_one_core_for_a_while():
     assert os.sched_getaffinity(0) == before
 
 
+def test_contestants_take_turns_and_say_how_far_they_are():
+    heard, turns = [], []
+    times = timing.take_turns(
+        {name: lambda name=name: float(turns.append(name) or len(turns)) for name in "ab"},
+        3,
+        heard.append,
+    )
+    assert "".join(turns) == "abababab"  # the first turn warms up
+    assert {name: list(of) for name, of in times.items()} == {"a": [3, 5, 7], "b": [4, 6, 8]}
+    assert heard == [0.25, 0.5, 0.75, 1.0]
+
+
 def test_spread():
     assert Spread.of(np.array([3.0, 1.0, 2.0])) == Spread(2.0, 1.5, 2.5)
     heard = []

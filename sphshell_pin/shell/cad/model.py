@@ -272,17 +272,22 @@ def count_open_edges(shape: Occ) -> int:
     )
 
 
+def quick_box(face: Occ) -> Occ:
+    """Return a Bnd_Box that holds a face, and may be far too large: the poles of splines too."""
+    box = Bnd_Box()
+    BRepBndLib.Add_s(face, box, False)
+    return box
+
+
 def box_size(shape: Occ) -> float:
     """Diagonal of the box around a shape [its units]; 0 if it is empty."""
     quick = []
     for face in faces_of(shape):
-        held = Bnd_Box()
-        BRepBndLib.Add_s(face, held, False)
+        held = quick_box(face)
         if not held.IsVoid():
             quick.append((held.SquareExtent(), held.CornerMin(), held.CornerMax(), face))
     box = Bnd_Box()
-    # The quick box may be far too large, as it holds the poles of the splines. Faces whose quick
-    # box lies within the box so far need no other one: the largest come first.
+    # Faces whose quick box lies within the box so far need no other one: the largest come first.
     for _, least, most, face in sorted(quick, key=lambda one: -one[0]):
         if box.IsVoid() or box.IsOut(least) or box.IsOut(most):
             BRepBndLib.AddOptimal_s(face, box, False, False)

@@ -59,9 +59,8 @@ def read_model(path: Path) -> cad_model.CadModel:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ShellFileError(path, f"is damaged, it cannot be read as {kind} ({reason})") from error
     if not model.faces:
-        raise ShellFileError(
-            path, "holds no surface, only curves or points at most: export faces or solids"
-        )
+        none = "holds no surface, only curves or points at most: export faces or solids"
+        raise ShellFileError(path, "; ".join(model.notes) or none)
     return model
 
 
@@ -148,7 +147,9 @@ def _read_brep(path: Path, data: bytes) -> cad_model.CadModel:
     shape = TopoDS_Shape()
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
-    return cad_model.CadModel(path, *_sort([("", shape)], _no_name, _no_name), cad_model.NO_UNIT)
+    faces, bodies = _sort([("", shape)], _no_name, _no_name)
+    notes = _lost(sum(1 for _ in cad_model.subshapes(shape, TopAbs_FACE)), faces)
+    return cad_model.CadModel(path, faces, bodies, cad_model.NO_UNIT, notes)
 
 
 def _no_name(_: Occ) -> str:
@@ -189,6 +190,9 @@ def _sort(
             name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
             bodies.append((_unique(name, [taken for taken, _ in bodies]), group))
             for face in cad_model.subshapes(group, TopAbs_FACE):
+                # Endless: what OpenCASCADE makes of one whose surface or borders are damaged.
+                if cad_model.quick_box(face).IsOpen():
+                    continue
                 number = len(faces) + 1
                 called = name_of_face(face) or f"Face {number}"
                 faces.append(cad_model.CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
