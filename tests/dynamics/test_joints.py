@@ -293,6 +293,12 @@ def test_a_model_states_its_joints() -> None:
     one_way.lowerEffortLimit[0] = -2.0
     assert sp.JointComponents.from_model(one_way).effort == {"hinge": (-2.0, 5.0)}
     assert sp.JointComponents.from_model(link(), ["damping"]).kinds() == ("damping",)
+    # The rotor behind its gear, unless the file states an armature.
+    geared = link()
+    geared.rotorInertia[0], geared.rotorGearRatio[0] = 2e-5, 50.0
+    assert sp.JointComponents.from_model(geared, ["armature"]).armature["hinge"] == 0.05
+    geared.armature = np.array([0.07])
+    assert sp.JointComponents.from_model(geared, ["armature"]).armature["hinge"] == 0.07
     with pytest.raises(NameNotFound, match=r"'drag'.*damping"):
         sp.JointComponents.from_model(link(), ["drag"])
 

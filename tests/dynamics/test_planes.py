@@ -61,6 +61,18 @@ POINT = sp.ImpactLaw(2e7, 1.5, 20.0, 1e-4)
 FRICTIONS = [None, sp.CoulombFriction(0.3, 0.2, 0.05, 0.5), sp.BristleFriction(0.4, 0.3, 2e4, 5.0)]
 
 
+def test_a_constraint_is_between_the_plane_and_the_part() -> None:
+    scene = egg_over(POINT)
+    q, _ = touching(scene)
+    (made,), contacts = scene.constraints(q).models, scene.contacts(q)
+    ends = {made.joint1_id: made.joint1_placement, made.joint2_id: made.joint2_placement}
+    np.testing.assert_allclose(ends[0].translation, contacts.point_world[0], atol=1e-12)
+    in_plane = scene.pairs[0].side_i.plane.placement.actInv
+    deepest = np.append(in_plane(contacts.point_world[0])[:2], -contacts.depth[0])
+    on_body = pin.XYZQUATToSE3(q).act(ends[1].translation)
+    np.testing.assert_allclose(in_plane(on_body), deepest, atol=1e-12)
+
+
 def test_rolling_loses_no_energy() -> None:
     """Free of friction and damping."""
     scene = egg_over(sp.ImpactLaw(2e7, 1.5, 0.0, 1e-4))
