@@ -273,6 +273,16 @@ def tube_on_equator(inner: float, tube: float, other: float) -> Solid:
     return checked(occ.fuse(occ.common(ring, below), occ.cut(block, bent)))
 
 
+def drafted_slot(low: float, high: float, height: float, length: float) -> Solid:
+    """Return a block between two cones about y, whose planes are tangent along their rulings.
+
+    Their radii are `low` at y = 0, `high` at the `height`; the second is at z = `length` [mm].
+    """
+    wedge = occ.extruded([(-low, 0), (low, 0), (high, height), (-high, height)], length)
+    first, second = (occ.cone(low, high, height, (0, 0, z), (0, 1, 0)) for z in (0, length))
+    return checked(occ.fuse(occ.fuse(wedge, first), second))
+
+
 def shift_planes(path: Path, by: float) -> None:
     """Move the planes of a STEP file [mm] along their normals, and leave its edges where they are.
 

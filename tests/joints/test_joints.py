@@ -52,6 +52,8 @@ WALKS = {
     **{part.name: (part.solid, 2000, False) for part in PARTS},
     **{f"STL {part.name}": (part.solid, 2000, True) for part in MESHED},
     **{name: (lambda sides=sides: plate(*sides), 2000, False) for name, sides in PLATES.items()},
+    "drafted slot": (lambda: solids.drafted_slot(9.0, 6.0, 12.0, 30.0), 3000, False),
+    "STL drafted slot": (lambda: solids.drafted_slot(9.0, 6.0, 12.0, 30.0), 3000, True),
     "tube on an equator": (lambda: solids.tube_on_equator(1.2, 0.8, 4.0), 3000, False),
 }
 
