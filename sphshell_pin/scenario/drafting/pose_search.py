@@ -178,23 +178,22 @@ class PressSearch(Search):
 
     def refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""
-        place, bench, frame = self.asked.place, self.bench, self.tip.frame
-        ends = other_ends(self.model, frame)
-        if not bench.postures:
-            way = f"along {place}" if place else "along any axis"
-            return CannotReach(
-                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried; its "
-                "joints do not allow it: take another --place or --frame",
-                frame,
-                ends,
-            )
+        bench, frame = self.bench, self.tip.frame
         ((link, _),) = bench.blocked.most_common(1) or [("", 0)]
-        if self.faults:
+        other_limb = bool(link)
+        if not bench.postures:
+            said = (
+                f"the tip on frame '{frame}' cannot move along {self.asked.place or 'any axis'} in "
+                "any posture that was tried; its joints do not allow it: take another --place or "
+                "--frame"
+            )
+            other_limb = True
+        elif self.faults:
             said = f"{self.failed()}; {_ADVICE[self.faults[-1].kind]}"
             # The force is held on faces, which links may have kept the tip from.
-            link = "" if self.even else link
+            other_limb = other_limb and not self.even
         elif self.refused:
-            said, link = self.refused[0], ""
+            said, other_limb = self.refused[0], False
         elif link:
             said = (
                 f"link '{link}' would be in the part, or another one: in each of "
@@ -203,6 +202,6 @@ class PressSearch(Search):
             )
         else:
             said = "the surface has no point to touch"
-        if not link:
+        if not other_limb:
             return SphshellError(said)
-        return CannotReach(said, frame, ends, bench.out_of_limb())
+        return CannotReach(said, frame, other_ends(self.model, frame), bench.out_of_limb())
