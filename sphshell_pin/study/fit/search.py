@@ -115,12 +115,12 @@ class Search:
         if patterned(self._compared()):
             # It may be where one pulse of the run lies on another one of the data. Both ends are
             # judged by their likelihood: weights of its own make every end look good.
-            ends = [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
+            ends = [self._end()]
             self.x = self._grown()
             if np.isfinite(self._values(self.x)).all():
                 self._settle()
-                ends += [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
-            _, self.x, self.sigma, self.converged = min(ends, key=lambda one: one[0])
+                ends.append(self._end())
+            _, self.x, self.sigma, self.converged = min(ends, key=lambda end: end[0])
 
     def _settle(self) -> None:
         """Search from where it is, until weights that are estimated from residuals stay."""
@@ -148,10 +148,10 @@ class Search:
                     x = part.x
         return x
 
-    def _negative_log_likelihood(self) -> float:
-        """Return the negative logarithm of the data's likelihood at x, less a constant."""
-        squares = ((self.measured - self._values(self.x)) / self.sigma) ** 2
-        return float(np.sum(np.log(self.sigma) + 0.5 * squares))
+    def _end(self) -> tuple[float, Array, Array, bool]:
+        """Return the negative log-likelihood at x, less a constant, x, sigma, and `converged`."""
+        unlikely = np.sum(np.log(self.sigma) + 0.5 * self._residuals(self.x) ** 2)
+        return float(unlikely), self.x, self.sigma, self.converged
 
     def _compared(self) -> tuple[Series, ...]:
         """Return the data with what the run at x says of them."""
@@ -328,7 +328,7 @@ def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[list[int]]
 def _quiet(sensor: Sensor) -> Sensor:
     """Return a sensor without noise: the data have their own."""
     noise = [one.name for one in fields(sensor) if one.name.endswith("noise")]
-    return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
+    return replace(sensor, **dict.fromkeys(noise, 0.0))  # type: ignore[arg-type]
 
 
 def _fitted(one: Free, unit: str, x: float, beyond: float, half: float) -> Fitted:
