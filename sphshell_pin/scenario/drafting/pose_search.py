@@ -148,9 +148,9 @@ class PressSearch(Search):
             self.even |= found.on_face
             gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
-            way = find_way(asked, place, self.held, radius, gap, self.room)
-            hollow = asked.inside
-            yield Press(place, way, pair, force, gap, weak=not stance.force, hollow=hollow)
+            way = find_way(asked, place, self.held, gap, self.room)
+            weak, hollow = not stance.force, asked.inside
+            yield Press(place, way, pair, force, gap, weak=weak, hollow=hollow)
 
     def _places(self) -> Iterator[Place]:
         """Yield places of the part before the tip, those on the floor of the robot's base first.
@@ -166,8 +166,7 @@ class PressSearch(Search):
         else:
             word = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
             for side in sides(shell) if word is None else [word]:
-                spots = list(touch_points(shell, radius, gap, toward=side, inside=asked.inside))
-                choices.append((side, spots))
+                choices.append((side, list(touch_points(shell, radius, gap, side))))
         place = PLACES.get(asked.place or "")
         for approach in [np.array(place)] if place else approaches(self.limb, self.bench.q):
             # Upright ones first, as they stand in their file.

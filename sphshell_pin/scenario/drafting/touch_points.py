@@ -51,21 +51,15 @@ class TouchPoint:
 
 
 def find_touch_point(
-    shell: Shell,
-    radius: float,
-    gap: float,
-    *,
-    toward: Array,
-    inside: bool = False,
-    beside: Array | float = 0.0,
+    shell: Shell, radius: float, gap: float, *, toward: Array, beside: Array | float = 0.0
 ) -> TouchPoint:
     """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
-    It is touched from the side `toward` (3,), with `inside` from its middle. `beside` (3,) [m]
-    moves the place away from the middle.
+    It is touched from the side `toward` (3,), a hollow from its middle. `beside` (3,) [m] moves the
+    place away from the middle.
     """
     start = shell.box.mean(axis=0) + beside
-    if not inside:
+    if shell.side != "inside":
         # Far out above the middle or, over a hole, beside it.
         start = start + 2 * shell.size * toward
         if not _advance(shell, start, -toward, 0.0, 1e-6 * shell.size)[2]:
@@ -93,14 +87,13 @@ def sides(shell: Shell) -> list[Array]:
     return sorted(axes, key=rank)
 
 
-def touch_points(
-    shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
-) -> Iterator[TouchPoint]:
+def touch_points(shell: Shell, radius: float, gap: float, toward: Array) -> Iterator[TouchPoint]:
     """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
-    middle, facing = shell.box.mean(axis=0), _facing(shell, -toward if inside else toward)
+    middle = shell.box.mean(axis=0)
+    facing = _facing(shell, -toward if shell.side == "inside" else toward)
     for point in (middle, *roomy_places(shell, facing)[0]):
         beside = point - middle - toward * (toward @ (point - middle))
-        yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
+        yield find_touch_point(shell, radius, gap, toward=toward, beside=beside)
 
 
 def widest_room(shell: Shell) -> float:
