@@ -1,4 +1,4 @@
-"""Texts of strangers: what of them may be printed, what is a number, which name is free."""
+"""Texts: what of strangers' may be printed, what is a number, which name is free, plurals."""
 
 import json
 import math
@@ -46,6 +46,11 @@ def free_name(wanted: str, taken: Container[str], numbered: str) -> str:
     """Return `wanted`; if that is `taken`, with the first free number, as "-{}" in `numbered`."""
     names = chain([wanted], (wanted + numbered.format(k) for k in count(2)))
     return next(name for name in names if name not in taken)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "1 noun", "2 nouns"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def number_of(text: str) -> float:

@@ -19,6 +19,7 @@ from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
+from sphshell_pin.dynamics.scene.mimic import joint_angle
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ResultError, import_extra
 from sphshell_pin.export.frames import WORLD, Frames, Message, header, take_name, transform, xyz
@@ -143,7 +144,7 @@ class _Run:
                 state = {
                     "header": header(t, ""),
                     "name": [name for name, _ in joints],
-                    "position": [_position(joint, q) for _, joint in joints],
+                    "position": [joint_angle(q[j.idx_q : j.idx_q + j.nq]) for _, j in joints],
                     "velocity": [float(v[joint.idx_v]) for _, joint in joints],
                 }
                 yield t, "/joint_states", "sensor_msgs/JointState", state
@@ -179,12 +180,6 @@ def _nanoseconds(t: Array, start: int) -> list[int]:
         f"has times from {t.min():.6g} to {t.max():.6g} s, which with start = {start} ns are "
         "not all from 1970 to 2038, as ROS 2 has them: give another start",
     )
-
-
-def _position(joint: pin.JointModel, q: Array) -> float:
-    """Return a joint's angle [rad] or length [m]; one that turns without end from -pi to pi."""
-    at = joint.idx_q
-    return float(q[at] if joint.nq == 1 else np.arctan2(q[at + 1], q[at]))
 
 
 def _topics(above: str, names: Iterable[str]) -> dict[str, str]:

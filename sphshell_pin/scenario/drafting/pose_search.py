@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import counted
 from sphshell_pin.dynamics.scene.models import joint_of
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -34,7 +35,6 @@ from sphshell_pin.scenario.drafting.touch_points import (
 )
 from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.drafting.vectors import nearest_axis
-from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
 
 # Drafts that are run, in all and before a path is given up.
