@@ -52,13 +52,9 @@ class Trial:
                 warnings.simplefilter("ignore", kind)
             built = rebuild(self.built, changes or {}, anew=True)
             sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
+            run, step = built.scenario.run, row_step(t) or None
             result = sp.Simulation(built.scene, built.simulation.integrator, sensors).run(
-                built.q0,
-                built.v0,
-                float(t[-1]),
-                built.controller,
-                built.scenario.run.control_dt,
-                record_dt=row_step(t) or None,
+                built.q0, built.v0, float(t[-1]), built.controller, run.control_dt, record_dt=step
             )
         return quantities_of(result, built.scene, t, wanted)
 
