@@ -78,7 +78,7 @@ class DropSearch(Search):
         model, shell, tips = self.model, self.shell, self.tips[:1] if falls else self.tips
         mass, (tip, *_) = float(pin.computeTotalMass(model)) / len(tips), tips
         # A robot is heavier than the ball that it got.
-        load = mass if tip.end or not falls else 0.0
+        load = mass if tip.made or not falls else 0.0
         materials = chosen_materials(self.asked, self.tips, load)
         least = min(one.radius for one in tips)
         depth = materials.depth(load * GRAVITY, least)
