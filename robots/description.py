@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.base.texts import number_of, visible
+from sphshell_pin.base.texts import counted, number_of, visible
 from sphshell_pin.dynamics.scene.mimic import Mimic
 from sphshell_pin.robots.packages import Folders
 
@@ -258,7 +258,7 @@ def _numbers(text: str, count: int, where: str) -> str:
     except ValueError:
         numbers = []
     if len(numbers) != count:
-        must = f"must be {count} finite number{'s' * (count > 1)}"
+        must = f"must be {counted(count, 'finite number')}"
         raise ValueError(f"{where} '{text}' {must}")
     return " ".join(map(repr, numbers))
 

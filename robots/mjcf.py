@@ -85,16 +85,9 @@ _SHAPES: dict[int, tuple[str, Callable[..., Any]]] = {
 _OTHERS = {0: "plane", mjcf_compile.MESH: "mesh"}
 _GRAY = (0.5, 0.5, 0.5, 1.0)
 _SHOWN_GROUPS = 3
-_NUMBERS: tuple[str, ...] = (
-    "body_pos",
-    "body_quat",
-    "body_ipos",
-    "body_iquat",
-    "body_mass",
-    "body_inertia",
-)
-_NUMBERS += ("jnt_pos", "jnt_axis", "jnt_range", "dof_armature", "dof_damping", "dof_frictionloss")
-_NUMBERS += ("geom_pos", "geom_quat", "geom_size", "site_pos", "site_quat", "qpos0", "key_qpos")
+_NUMBERS = ["body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia"]
+_NUMBERS += ["jnt_pos", "jnt_axis", "jnt_range", "dof_armature", "dof_damping", "dof_frictionloss"]
+_NUMBERS += ["geom_pos", "geom_quat", "geom_size", "site_pos", "site_quat", "qpos0", "key_qpos"]
 
 
 def read_mjcf(root: ET.Element, folders: Folders, *, floats: bool | None = None) -> Description:

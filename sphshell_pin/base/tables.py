@@ -4,7 +4,6 @@ import csv
 import io
 import math
 from collections.abc import Mapping
-from typing import IO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,8 +50,8 @@ def _cell(value: object) -> object:
     return "" if isinstance(value, float) and math.isnan(value) else value
 
 
-def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) -> None:
-    """Write `table` as .parquet with `metadata`; numbers are read back exactly.
+def parquet_bytes(table: Table, metadata: Mapping[str, str]) -> bytes:
+    """Return `table` as a .parquet file with `metadata`; numbers are read back exactly.
 
     Lists, and arrays of objects, are texts. Raises MissingExtra without pyarrow.
     """
@@ -66,4 +65,6 @@ def write_parquet(file: IO[bytes], table: Table, metadata: Mapping[str, str]) ->
         # The type of an empty list would be unknown.
         columns[name] = arrow.array(array.tolist(), arrow.string()) if text else values
     whole = arrow.table(columns).replace_schema_metadata(metadata)
+    file = io.BytesIO()
     parquet.write_table(whole, file, compression="zstd", write_page_checksum=True)
+    return file.getvalue()

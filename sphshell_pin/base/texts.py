@@ -1,9 +1,10 @@
-"""Texts of strangers: what of them may be printed, and what is a number."""
+"""Texts: what of strangers' may be printed, what is a number, which name is free, plurals."""
 
 import json
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
+from itertools import chain, count
 
 import numpy as np
 
@@ -39,6 +40,17 @@ _NUMBER = re.compile(r"\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*")
 def visible(text: str) -> str:
     r"""Return `text` with escapes such as "\x1b" for what a terminal acts on."""
     return _ACTS.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+
+
+def free_name(wanted: str, taken: Container[str], numbered: str) -> str:
+    """Return `wanted`; if that is `taken`, with the first free number, as "-{}" in `numbered`."""
+    names = chain([wanted], (wanted + numbered.format(k) for k in count(2)))
+    return next(name for name in names if name not in taken)
+
+
+def counted(number: int, noun: str) -> str:
+    """Return "1 noun", "2 nouns"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def number_of(text: str) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import free_name
 from sphshell_pin.dynamics.scene.models import find_frame
 from sphshell_pin.dynamics.scene.scene import Scene
 
@@ -32,10 +33,6 @@ class Frames:
     fixed: list[tuple[str, str, pin.SE3]] = field(default_factory=list)
     names: dict[object, str] = field(default_factory=dict)
 
-    def on(self, joint: int) -> tuple[str, pin.SE3]:
-        """Return the frame that moves with `joint`, and where it is in the joint."""
-        return self.moving.get(joint, (WORLD, pin.SE3.Identity()))
-
     @classmethod
     def of(cls, scene: Scene) -> Frames:
         """Return the frames of the links, spheres and shells of `scene`.
@@ -50,32 +47,31 @@ class Frames:
         wanted |= {find_frame(model, name) for name in named}
         taken = {WORLD, *(model.frames[k].name for k in wanted)}
         links = [model.frames[k] for k in sorted(wanted - {0})]
-        for frame in reversed(links):  # the first of a joint is the last that is put there
-            made.moving[int(frame.parentJoint)] = frame.name, pin.SE3(frame.placement)
-        made.moving.pop(0, None)
         for frame in links:
-            joint = int(frame.parentJoint)
-            if made.on(joint)[0] != frame.name:
-                made._hang(frame.name, joint, pin.SE3(frame.placement))
+            joint, place = int(frame.parentJoint), pin.SE3(frame.placement)
+            if joint and joint not in made.moving:
+                made.moving[joint] = frame.name, place
+            else:
+                made._hang(frame.name, joint, place)
         # A joint that carries nothing itself may carry other joints.
         for joint in range(1, model.njoints):
             if joint not in made.moving:
-                made.moving[joint] = free_name(model.names[joint], taken), pin.SE3.Identity()
+                made.moving[joint] = take_name(model.names[joint], taken), pin.SE3.Identity()
         for pair in scene.pairs:
-            made.names[pair.name] = free_name(f"contact/{pair.name}", taken)
+            made.names[pair.name] = take_name(f"contact/{pair.name}", taken)
             for k, ball in enumerate(pair.spheres):
-                name = free_name(f"sphere/{pair.name}{'/other' * k}", taken)
+                name = take_name(f"sphere/{pair.name}{'/other' * k}", taken)
                 made.names[pair.name, k] = name
                 made._hang(name, ball.joint, ball.in_joint)
             for one in pair.shells:
                 if one.key not in made.names:
-                    made.names[one.key] = free_name(f"shell/{one.shell.name}", taken)
+                    made.names[one.key] = take_name(f"shell/{one.shell.name}", taken)
                     made._hang(made.names[one.key], one.joint, one.in_joint)
         return made
 
     def _hang(self, name: str, joint: int, place: pin.SE3) -> None:
         """Add a frame at `place` in `joint`, fixed to what moves with the joint."""
-        parent, at = self.on(joint)
+        parent, at = self.moving.get(joint, (WORLD, pin.SE3.Identity()))
         self.fixed.append((name, parent, at.actInv(place)))
 
 
@@ -97,10 +93,8 @@ def transform(time: int, parent: str, name: str, place: pin.SE3) -> Message:
     return {"header": header(time, parent), "child_frame_id": name, "transform": at}
 
 
-def free_name(wanted: str, taken: set[str], mark: str = "-") -> str:
+def take_name(wanted: str, taken: set[str], mark: str = "-") -> str:
     """Return the name `wanted`, with `mark` and a number if it is taken; take it."""
-    name, k = wanted, 2
-    while name in taken:
-        name, k = f"{wanted}{mark}{k}", k + 1
+    name = free_name(wanted, taken, f"{mark}{{}}")
     taken.add(name)
     return name

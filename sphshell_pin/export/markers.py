@@ -37,15 +37,14 @@ def sphere_markers(scene: Scene, frames: Frames, time: int) -> Message:
 def _marker(
     time: int, frame: str, kind: int, size: float, color: int, points: Array | None = None
 ) -> Message:
-    opacity = 0.6 if kind == SPHERE else 1.0
+    rgba = *((color >> k & 255) / 255 for k in (16, 8, 0)), 0.6 if kind == SPHERE else 1.0
     return {
         "header": header(time, frame),
         "ns": frame,
         "type": kind,
         "pose": {"orientation": {"w": 1.0}},
         "scale": xyz(np.full(3, size)),
-        "color": {c: (color >> k & 255) / 255 for c, k in zip("rgb", (16, 8, 0), strict=True)}
-        | {"a": opacity},
+        "color": dict(zip("rgba", rgba, strict=True)),
         "frame_locked": True,
         "points": [] if points is None else [xyz(point) for point in points],
     }

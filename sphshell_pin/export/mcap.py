@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from sphshell_pin._versions import __version__
-from sphshell_pin.base.arrays import Array, Longs
+from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.atomic import atomic_file
 from sphshell_pin.base.checks import check_type
 from sphshell_pin.base.regular_file import StrPath
@@ -19,9 +19,10 @@ from sphshell_pin.base.tables import quantity_of
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.result.result_parts import PairSeries
 from sphshell_pin.dynamics.result.result_scene import check_scene, scene_of, sound_rows
+from sphshell_pin.dynamics.scene.mimic import joint_angle
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import ResultError, import_extra
-from sphshell_pin.export.frames import WORLD, Frames, Message, free_name, header, transform, xyz
+from sphshell_pin.export.frames import WORLD, Frames, Message, header, take_name, transform, xyz
 from sphshell_pin.export.markers import shell_markers, sphere_markers
 from sphshell_pin.export.messages import full_name, schema_of
 
@@ -39,8 +40,6 @@ _LATCHED = (
 
 _Sent = tuple[int, str, str, Message]
 """Time of a message [ns], topic, type, content."""
-_FLOAT, _MARKERS = "std_msgs/Float64", "visualization_msgs/MarkerArray"
-_TRANSFORMS, _WRENCH = "tf2_msgs/TFMessage", "geometry_msgs/WrenchStamped"
 
 
 def write_mcap(
@@ -51,17 +50,17 @@ def write_mcap(
     scene = scene_of(result, scene)
     check_scene(result, scene, "the result")
     check_type("start", start, int, "must be a whole number of nanoseconds since 1970")
-    run, path = _Run(result, scene, start), Path(path)
-    origin = result.origin
+    run = _Run(result, scene, start)
+    path, origin, first = Path(path), result.origin, run.times[0]
     about = {"version": __version__, "start [ns]": str(start)}
-    about |= {} if origin is None else {"scenario": origin.scenario}
     about |= {f"contact {name}": topic for name, topic in run.topics.items()}
     try:
         with atomic_file(path) as stream, mcap.Writer(stream) as writer:
-            writer.add_metadata("sphshell_pin", about)
             if origin is not None:
+                about["scenario"] = origin.scenario
                 data = json.dumps(origin.settings, indent=1).encode()
-                writer.add_attachment(run.first, run.first, "settings.json", "text/json", data)
+                writer.add_attachment(first, first, "settings.json", "text/json", data)
+            writer.add_metadata("sphshell_pin", about)
             schemas, static = {}, list(run.static())
             for k, (time, topic, kind, message) in enumerate(chain(static, run.messages())):
                 if kind not in schemas:
@@ -84,43 +83,41 @@ class _Run:
         self.result, self.scene, self.start = result, scene, start
         # A run that diverged is written up to where its numbers end.
         self.count = sound_rows("the result", result.q, result.v)
-        self.times = _nanoseconds(result.t[: self.count], start).tolist()
-        self.first = self.times[0]
+        self.times = _nanoseconds(result.t[: self.count], start)
         self.frames = Frames.of(scene)
-        touched = sorted({int(k) for k in result.contacts.pair})
+        touched = np.unique(result.contacts.pair).tolist()
         self.series = {k: PairSeries.of(result, k) for k in touched}
-        self.topics = _topics("contacts", [result.pairs[k] for k in touched])
+        self.topics = _topics("contacts", [series.name for series in self.series.values()])
         self.sensors = _topics("sensors", result.sensors)
 
     def static(self) -> Iterator[_Sent]:
         """Yield what is said once."""
-        t, scene, frames = self.first, self.scene, self.frames
+        t, scene, frames = self.times[0], self.scene, self.frames
         fixed = [transform(t, parent, name, at) for name, parent, at in frames.fixed]
-        yield t, "/tf_static", _TRANSFORMS, {"transforms": fixed}
-        yield t, "/shells", _MARKERS, shell_markers(scene, frames, t)
-        yield t, "/spheres", _MARKERS, sphere_markers(scene, frames, t)
+        yield t, "/tf_static", "tf2_msgs/TFMessage", {"transforms": fixed}
+        yield t, "/shells", "visualization_msgs/MarkerArray", shell_markers(scene, frames, t)
+        yield t, "/spheres", "visualization_msgs/MarkerArray", sphere_markers(scene, frames, t)
 
     def messages(self) -> Iterator[_Sent]:
         """Yield all other messages in the order of their times."""
-        floats = []
-        for topic, series in zip(self.topics.values(), self.series.values(), strict=True):
-            columns = {"normal_force": series.normal, "depth": series.depth}
-            floats.append(self._floats(topic, self.result.t[: self.count], columns))
-        energy = dict(self.result.energy_columns())
-        times = np.asarray(energy.pop("t [s]"))[: self.count]
-        floats.append(self._floats("/energy", times, {k: np.asarray(e) for k, e in energy.items()}))
+        energy = self.result.energy_columns()
+        t = energy.pop("t [s]")[: self.count]
+        floats = [
+            self._floats(topic, t, {"normal_force": series.normal, "depth": series.depth})
+            for topic, series in zip(self.topics.values(), self.series.values(), strict=True)
+        ]
+        floats.append(self._floats("/energy", t, energy))
         for name, log in self.result.sensors.items():
             columns = dict(zip(log.columns, log.values.T, strict=True))
             floats.append(self._floats(self.sensors[name], log.t, columns))
-        events = self._events()
-        yield from heapq.merge(self._rows(), *floats, events, key=lambda one: one[0])
+        yield from heapq.merge(self._rows(), *floats, self._events(), key=lambda sent: sent[0])
 
     def _floats(self, above: str, t: Array, columns: Mapping[str, Array]) -> Iterator[_Sent]:
         """Yield the numbers of columns (n,) by their titles, at the times t (n,) [s]."""
         topics = {f"{above}/{_token(quantity_of(title)[0])}": c for title, c in columns.items()}
-        for row, time in enumerate(_nanoseconds(t, self.start).tolist()):
+        for row, time in enumerate(_nanoseconds(t, self.start)):
             for topic, values in topics.items():
-                yield time, topic, _FLOAT, {"data": float(values[row])}
+                yield time, topic, "std_msgs/Float64", {"data": float(values[row])}
 
     def _rows(self) -> Iterator[_Sent]:
         model, data = self.scene.model, self.scene.model.createData()
@@ -142,18 +139,18 @@ class _Run:
                 for frame, center, _ in wrenches
             ]
             if moved:
-                yield t, "/tf", _TRANSFORMS, {"transforms": moved}
+                yield t, "/tf", "tf2_msgs/TFMessage", {"transforms": moved}
             if joints:
                 state = {
                     "header": header(t, ""),
                     "name": [name for name, _ in joints],
-                    "position": [_position(joint, q) for _, joint in joints],
+                    "position": [joint_angle(q[j.idx_q : j.idx_q + j.nq]) for _, j in joints],
                     "velocity": [float(v[joint.idx_v]) for _, joint in joints],
                 }
                 yield t, "/joint_states", "sensor_msgs/JointState", state
             for topic, (frame, _, wrench) in zip(self.topics.values(), wrenches, strict=True):
                 message = {"header": header(t, frame), "wrench": wrench}
-                yield t, f"{topic}/wrench", _WRENCH, message
+                yield t, f"{topic}/wrench", "geometry_msgs/WrenchStamped", message
 
     def _wrench(self, index: int, row: int, data: pin.Data) -> tuple[str, Array, Message]:
         """Return the frame at the center of a pair's sphere, that center, and the wrench there."""
@@ -166,36 +163,29 @@ class _Run:
 
     def _events(self) -> Iterator[_Sent]:
         times = _nanoseconds(np.array([event.t for event in self.result.events]), self.start)
-        for t, event in zip(times.tolist(), self.result.events, strict=True):
+        for t, event in zip(times, self.result.events, strict=True):
             said = {"stamp": header(t, "")["stamp"], "level": _INFO}
             yield t, "/events", "rcl_interfaces/Log", said | {"name": event.pair, "msg": event.kind}
 
 
-def _nanoseconds(t: Array, start: int) -> Longs:
+def _nanoseconds(t: Array, start: int) -> list[int]:
     """Return the time stamps of the times `t` [s]: whole nanoseconds since 1970."""
     # As floats first: the nanoseconds of what is far too large are no whole number.
-    near = np.abs(t).max(initial=0.0) < _LAST * 1e-9
-    ends = (t.min(initial=0), t.max(initial=0)) if near else ()
-    stamps = [start + round(float(one) * 1e9) for one in ends]
-    if len(t) and not (near and stamps[0] >= 0 and stamps[1] < _LAST):
-        raise ResultError(
-            "the result",
-            f"has times from {t.min():.6g} to {t.max():.6g} s, which with start = {start} ns are "
-            "not all from 1970 to 2038, as ROS 2 has them: give another start",
-        )
-    return start + np.rint(t * 1e9).astype(np.int64)
-
-
-def _position(joint: pin.JointModel, q: Array) -> float:
-    """Return a joint's angle [rad] or length [m]; one that turns without end from -pi to pi."""
-    at = joint.idx_q
-    return float(q[at] if joint.nq == 1 else np.arctan2(q[at + 1], q[at]))
+    if np.abs(t).max(initial=0.0) < _LAST * 1e-9:
+        stamps = [start + round(one) for one in (t * 1e9).tolist()]
+        if all(0 <= stamp < _LAST for stamp in stamps):
+            return stamps
+    raise ResultError(
+        "the result",
+        f"has times from {t.min():.6g} to {t.max():.6g} s, which with start = {start} ns are "
+        "not all from 1970 to 2038, as ROS 2 has them: give another start",
+    )
 
 
 def _topics(above: str, names: Iterable[str]) -> dict[str, str]:
     """Return a topic of its own for each of `names`: ROS 2 allows letters, digits, underscores."""
     used: set[str] = set()
-    return {name: f"/{above}/{free_name(_token(name), used, '_')}" for name in names}
+    return {name: f"/{above}/{take_name(_token(name), used, '_')}" for name in names}
 
 
 def _token(name: str) -> str:

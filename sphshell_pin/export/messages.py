@@ -14,7 +14,6 @@ DEFINITIONS = dict(text.strip().split("\n", 1) for text in _TEXT.split("\n\n"))
 """By type (package/Name), the lines of its .msg file."""
 
 _OTHER = re.compile(r"^([a-z]\w*/\w+)", re.MULTILINE)
-_LINE = "=" * 80
 
 
 def schema_of(kind: str) -> str:
@@ -23,15 +22,11 @@ def schema_of(kind: str) -> str:
     So MCAP's "ros2msg" schemas are written: the parts are separated by a line of 80 "=" and "MSG: "
     with the name of the type.
     """
-    whole = [DEFINITIONS[kind]]
-    inner: list[str] = []
-    for text in whole:  # grows
-        for name in _OTHER.findall(text):
-            if name not in inner:
-                inner.append(name)
-                whole.append(DEFINITIONS[name])
-    parts = [f"MSG: {name}\n{DEFINITIONS[name]}" for name in inner]
-    return f"\n{_LINE}\n".join([DEFINITIONS[kind], *parts]) + "\n"
+    kinds = [kind]
+    for one in kinds:  # grows
+        kinds += [k for k in dict.fromkeys(_OTHER.findall(DEFINITIONS[one])) if k not in kinds]
+    parts = [f"MSG: {one}\n{DEFINITIONS[one]}" for one in kinds[1:]]
+    return f"\n{'=' * 80}\n".join([DEFINITIONS[kind], *parts]) + "\n"
 
 
 def full_name(kind: str) -> str:

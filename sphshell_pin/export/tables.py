@@ -1,12 +1,11 @@
 """A result as a folder of tables: rows, contacts, events, energy and sensors."""
 
-import io
 from pathlib import Path
 from typing import Literal
 
 from sphshell_pin.base.atomic.files import write_folder
 from sphshell_pin.base.regular_file import StrPath
-from sphshell_pin.base.tables import Table, csv_text, write_parquet
+from sphshell_pin.base.tables import Table, csv_text, parquet_bytes
 from sphshell_pin.dynamics.result.result import Result
 from sphshell_pin.dynamics.scene.scene import Scene
 
@@ -42,14 +41,9 @@ def write_tables(
     ResultError
         The folder cannot be written.
     """
-    tables = tables_of(result, scene)
-    if format == "csv":
-        data = {f"{name}.csv": csv_text(table).encode() for name, table in tables.items()}
-    else:
-        scenario = "" if result.origin is None else result.origin.scenario
-        data = {}
-        for name, table in tables.items():
-            stream = io.BytesIO()
-            write_parquet(stream, table, {"scenario": scenario})
-            data[f"{name}.parquet"] = stream.getvalue()
-    return write_folder(folder, data, [f"{name}.{format}" for name in KINDS])
+    about = {"scenario": "" if result.origin is None else result.origin.scenario}
+    files = {
+        f"{name}.{format}": csv_text(t).encode() if format == "csv" else parquet_bytes(t, about)
+        for name, t in tables_of(result, scene).items()
+    }
+    return write_folder(folder, files, [f"{name}.{format}" for name in KINDS])

@@ -11,8 +11,8 @@ import numpy as np
 
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.study.report.surfaces import Mesh, icosphere
-from sphshell_pin.study.report.swing import any_turn
+from sphshell_pin.study.report.surfaces import Mesh
+from sphshell_pin.study.report.swing import turned_icosphere
 from tests import meshes
 from tests.contact.smooth import surfaces as unit
 from tests.hard_cases.balls import RADIUS
@@ -48,8 +48,7 @@ def count(length: float, side: float) -> int:
 def sphere(radius: float, side: float = SIDE) -> Shell:
     """Closed sphere about the origin: a bowl from inside, a dome from outside."""
     level = max(0, round(math.log2(1.16 * radius / (side * RADIUS))))
-    mesh, turn = icosphere(level, radius), any_turn()
-    return shell_of(Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T))
+    return shell_of(turned_icosphere(level, radius))
 
 
 def cone(half_angle: float, low: float, high: float, side: float = SIDE) -> Shell:

@@ -40,7 +40,7 @@ def test_a_spot_avoids_edges_and_grooves():
     up = np.array([0.0, 0.0, 1.0])
     middle = find_touch_point(shell, 0.01, 1e-3, toward=up)
     assert not touches_once(shell, middle, middle.point[None], 0.01, 1e-3)
-    spots = touch_points(shell, 0.01, 1e-3, toward=up)
+    spots = touch_points(shell, 0.01, 1e-3, up)
     good = next(one for one in spots if touches_once(shell, one, one.point[None], 0.01, 1e-3))
     assert abs(good.point[0]) > 0.002
     np.testing.assert_allclose(np.abs(good.normal), [np.sqrt(0.5), 0, np.sqrt(0.5)], atol=1e-6)
@@ -51,22 +51,22 @@ def test_a_spot_avoids_edges_and_grooves():
 
 
 @pytest.mark.parametrize(
-    ("geometry", "toward", "inside", "point", "normal"),
+    ("geometry", "toward", "side", "point", "normal"),
     [
-        (coal.Box(0.2, 0.2, 0.04), None, False, [0, 0, 0.02], [0, 0, 1]),
-        (coal.Box(0.2, 0.04, 0.2), None, False, [0, 0.02, 0], [0, 1, 0]),
-        (coal.Box(0.1, 0.08, 0.1), None, False, [0, 0, 0.05], [0, 0, 1]),
-        (coal.Box(0.2, 0.2, 0.04), [1, 0, 0], False, [0.1, 0, 0], [1, 0, 0]),
-        (coal.Sphere(0.1), [0, 0, 1], True, [0, 0, -0.1], [0, 0, 1]),
-        (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None, False, [0, 0, 0], [0, 0, 1]),
+        (coal.Box(0.2, 0.2, 0.04), None, "both", [0, 0, 0.02], [0, 0, 1]),
+        (coal.Box(0.2, 0.04, 0.2), None, "both", [0, 0.02, 0], [0, 1, 0]),
+        (coal.Box(0.1, 0.08, 0.1), None, "both", [0, 0, 0.05], [0, 0, 1]),
+        (coal.Box(0.2, 0.2, 0.04), [1, 0, 0], "both", [0.1, 0, 0], [1, 0, 0]),
+        (coal.Sphere(0.1), [0, 0, 1], "inside", [0, 0, -0.1], [0, 0, 1]),
+        (coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), None, "both", [0, 0, 0], [0, 0, 1]),
     ],
 )
 def test_a_surface_is_touched_in_the_middle_of_its_broad_side(
-    geometry, toward, inside, point, normal
+    geometry, toward, side, point, normal
 ):
-    shell = shell_of(geometry)
+    shell = sp.Shell.from_geometry(geometry, side=side)
     toward = sides(shell)[0] if toward is None else np.array(toward, float)
-    spot = find_touch_point(shell, 0.01, 1e-3, toward=toward, inside=inside)
+    spot = find_touch_point(shell, 0.01, 1e-3, toward=toward)
     np.testing.assert_allclose(spot.point, point, atol=1e-4)
     np.testing.assert_allclose(spot.normal, normal, atol=1e-3)
     np.testing.assert_allclose(spot.center, spot.point + 0.011 * spot.normal, atol=2e-6)

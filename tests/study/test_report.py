@@ -31,9 +31,7 @@ def times(seconds: float) -> np.ndarray:
 @cache
 def force_rows() -> list[convergence.Row]:
     return [
-        row
-        for name in convergence.REPORTED
-        for row in convergence.measure(name, convergence.SURFACES[name], rounds=2, finest=2)
+        row for name in surfaces.SURFACES for row in convergence.measure(name, rounds=2, finest=2)
     ]
 
 
@@ -55,7 +53,7 @@ def integrators(*, quick, progress):
 
 
 def panda(*, quick, progress):
-    names = steps.WHOLE[:-1]
+    names = steps.BARE, steps.FREE, steps.FAR, steps.TOUCHING, steps.CONTROL_FREE
     whole = {name: times(2e-6 + 2e-7 * k) for k, name in enumerate(names)}
     whole[steps.CONTROL_TOUCHING] = times(3.5e-6)
     return steps.assemble(whole)
@@ -115,7 +113,7 @@ def test_whole_report(small, tmp_path):
     assert sorted(f.name for f in tmp_path.iterdir() if f.name.startswith(".")) == []
     found = table_of(tmp_path / "forces_orders.csv")
     assert {(row["surface"], row["method"]) for row in found} == {
-        (name, rule) for name in convergence.REPORTED for rule in convergence.RULES
+        (name, rule) for name in surfaces.SURFACES for rule in convergence.RULES
     }
     data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     verdicts = {one["key"]: one["met"] for s in data["sections"] for one in s["findings"]}

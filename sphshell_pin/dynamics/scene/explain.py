@@ -15,6 +15,7 @@ import numpy as np
 from sphshell_pin import _core
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.summary import names as listed
+from sphshell_pin.base.texts import counted
 from sphshell_pin.contact.laws import HuntCrossleyLaw
 from sphshell_pin.dynamics.scene.joint_components import WHICH, JointComponents
 from sphshell_pin.dynamics.scene.models import beyond_limits, unit_warning
@@ -124,7 +125,7 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
             seen.setdefault((pair.group, kind), []).append(warning)
     for (group, _), alike in seen.items():
         more = (
-            f" (and {_count(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
+            f" (and {counted(len(alike) - 1, 'other')} of '{group}')" if group and alike[1:] else ""
         )
         warnings.append(f"{alike[0]}{more}")
     coarse = coarseness(scene, pairs, dt)
@@ -132,9 +133,9 @@ def explain_scene(scene: Scene, q: Array, v: Array, dt: float | None) -> Explana
         warnings.append(coarse)
     free = sum(1 for j in model.joints[1:] if j.nv)
     modelled = [
-        f"{_count(free, 'joint')} with {_count(model.nv, 'degree')} of freedom",
+        f"{counted(free, 'joint')} with {counted(model.nv, 'degree')} of freedom",
         f"gravity {gravity:.4g} m/s^2" if gravity else "no gravity",
-        _count(len(pairs), "contact pair"),
+        counted(len(pairs), "contact pair"),
     ]
     modelled += _joints_modelled(scene)
     absent = ["contact between other pairs of bodies", *_joints_stated(scene)]
@@ -361,10 +362,6 @@ def _warnings_of(scene: Scene, pair: ContactPair, figures: PairExplanation) -> l
     if any(one.method == "elements" for one in pair.shells):
         out.append(f"{where}: method 'elements' counts a place of touch once per touched element")
     return out
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _round_down(x: float) -> float:

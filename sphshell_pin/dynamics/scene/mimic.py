@@ -115,7 +115,7 @@ def shortened(model: pin.Model, q_all: ArrayLike, *, check: bool = False) -> Arr
     kept = [at[name] for name in list(model.names)[1:] if name not in rules]
     if check:
         for rule in rules.values():
-            check_follows(rule, _angle(at[rule.joint]), _angle(at[rule.of]))
+            check_follows(rule, joint_angle(at[rule.joint]), joint_angle(at[rule.of]))
     return np.concatenate(kept) if kept else np.zeros(0)
 
 
@@ -129,8 +129,11 @@ def check_follows(rule: Mimic, value: float, of: float) -> None:
         )
 
 
-def _angle(value: Sequence[float] | Array) -> float:
-    """Return the coordinate of a joint, of a continuous one the angle of its cosine and sine."""
+def joint_angle(value: Sequence[float] | Array) -> float:
+    """Return the coordinate of a joint; of one that turns without end its angle, -pi to pi [rad].
+
+    value : (1,), or (2,): its cosine and its sine
+    """
     return float(value[0]) if len(value) == 1 else float(np.arctan2(value[1], value[0]))
 
 

@@ -18,6 +18,7 @@ from sphshell_pin import _core
 from sphshell_pin.base import checks
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.base.summary import Fact, Summarized, names
+from sphshell_pin.base.texts import free_name
 from sphshell_pin.contact import Friction, FunctionFriction, NormalLaw, Plane, Sphere
 from sphshell_pin.contact.normal_law import check_law
 from sphshell_pin.dynamics.compiled.robot import load_compiled
@@ -311,10 +312,7 @@ class SceneParts(Summarized):
             if name in taken:
                 raise InvalidParameter("name", name, "is taken by another contact of this scene")
             return name
-        wanted, k = default, 2
-        while wanted in taken:
-            wanted, k = f"{default}-{k}", k + 1
-        return wanted
+        return free_name(default, taken, "-{}")
 
     def with_pairs(self, pairs: tuple[ContactPair, ...]) -> Self:
         """Return a scene of the same model, which both share, with other `pairs`."""

@@ -124,17 +124,18 @@ class Asked:
             self.at = self.at.strip() if point is None else point
         elif self.at is not None:
             self.at = check_vector("at", self.at, 3, " [m]")
-        if self.length is not None and not (isinstance(self.path, str) and self.path in SHAPES):
-            why = f"belongs to a path of {', '.join(SHAPES)}: name one"
-            raise InvalidParameter("length", self.length, why)
+        shapes = ", ".join(SHAPES)
         if isinstance(self.path, str) and self.path not in SHAPES:
             rows = [_numbers(one) for one in self.path.split(";") if one.strip()]
             if not rows or any(one is None for one in rows):
-                why = f"must be {', '.join(SHAPES)}, or points [m] of the part: 'x,y,z; x,y,z'"
+                why = f"must be {shapes}, or points [m] of the part: 'x,y,z; x,y,z'"
                 raise InvalidParameter("path", self.path, why)
             self.path = np.array(rows)
         elif self.path is not None and not isinstance(self.path, str):
             self.path = check_points("path", self.path)
+        if self.length is not None and not isinstance(self.path, str):
+            why = f"belongs to a path of {shapes}: name one"
+            raise InvalidParameter("length", self.length, why)
         if isinstance(self.path, np.ndarray) and self.at is not None:
             raise InvalidParameter(
                 "at", self.at, "the first point of the path says it: leave it out"

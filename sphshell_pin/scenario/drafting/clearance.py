@@ -50,14 +50,14 @@ class Links:
         for k, result in enumerate(self._geometry_data.collisionResults):
             if result.isCollision():
                 self._geometry_data.deactivateCollisionPair(k)
-        self.shell, self._tips = shell, tuple(tips)
+        self.shell, self._tips = shell, [(find_frame(model, tip.frame), tip) for tip in tips]
         triangles = shell.triangles
         if shell.side == "inside":
             # Of a hollow links may not touch the lower half, as a bowl's.
             heights = shell.vertices[triangles, 2].max(axis=1)
             triangles = triangles[heights <= shell.box[:, 2].mean() + 1e-9 * shell.size]
         self._surface = coal_tree(shell.vertices, triangles)
-        frames = [model.frames[find_frame(model, tip.frame)] for tip in tips]
+        frames = [model.frames[k] for k, _ in self._tips]
         held = set(held_joints(model, tuple(lock)))
         movers = [set(map(int, chain)) - held for chain in model.supports]
         self._objects: list[tuple[int, list[int]]] = []
@@ -102,9 +102,8 @@ class Links:
         """
         self._place(q)
         pin.updateFramePlacements(self.model, self._data)
-        frames = (self._data.oMf[find_frame(self.model, tip.frame)] for tip in self._tips)
-        tips = zip(frames, self._tips, strict=True)
-        balls = [(placement.actInv(frame.act(tip.offset)), tip) for frame, tip in tips]
+        frames = self._data.oMf
+        balls = [(placement.actInv(frames[k].act(tip.offset)), tip) for k, tip in self._tips]
         for k, (i, at) in enumerate(self._objects):
             one = self._geometry.geometryObjects[i]
             pose = placement.actInv(self._geometry_data.oMg[i])

@@ -78,7 +78,7 @@ class DropSearch(Search):
         model, shell, tips = self.model, self.shell, self.tips[:1] if falls else self.tips
         mass, (tip, *_) = float(pin.computeTotalMass(model)) / len(tips), tips
         # A robot is heavier than the ball that it got.
-        load = mass if tip.end or not falls else 0.0
+        load = mass if tip.made or not falls else 0.0
         materials = chosen_materials(self.asked, self.tips, load)
         least = min(one.radius for one in tips)
         depth = materials.depth(load * GRAVITY, least)
@@ -87,7 +87,7 @@ class DropSearch(Search):
         beside = falls * _BESIDE * (shell.box[1] - shell.box[0]) * np.array([1.0, 0.5, 0.0])
         centers = sphere_centers(model, self.q0, tips)
         q, radii = self.q0.copy(), np.array([one.radius for one in tips])
-        q[:3] += way_down(shell, centers, radii, gap, inside=self.asked.inside, beside=beside)
+        q[:3] += way_down(shell, centers, radii, gap, beside)
         speed = math.sqrt(2 * GRAVITY * gap)
         why = [
             f"the sphere of radius {mm(t.radius)} on frame '{t.frame}': {t.source}" for t in tips
@@ -111,20 +111,14 @@ class DropSearch(Search):
 
 
 def way_down(
-    shell: Shell,
-    centers: Array,
-    radii: Array,
-    gap: float,
-    *,
-    inside: bool = False,
-    beside: Array | float = 0.0,
+    shell: Shell, centers: Array, radii: Array, gap: float, beside: Array | float = 0.0
 ) -> Array:
     """Return how spheres move (3,) [m] so that the nearest one has the `gap` [m] to the shell.
 
     The center of all is above the shell's center then, or `beside` it (3,) [m]; if none of them
     would land on it there, that of the first one.
     """
-    place = find_touch_point(shell, radii[0], gap, toward=_UP, inside=inside, beside=beside)
+    place = find_touch_point(shell, radii[0], gap, toward=_UP, beside=beside)
     if len(centers) == 1:
         return np.asarray(place.center - centers[0])
     for anchor in (centers.mean(axis=0), centers[0]):

@@ -20,6 +20,7 @@ from sphshell_pin.scenario.drafting.limb_ends import (
     gripper_joints,
     sphere_centers,
 )
+from sphshell_pin.scenario.drafting.wording import mm
 
 _ASKED, _OF_GEOMETRY = "as it was asked for", "the sphere of its collision geometry"
 _SMALLER = "smaller than that of its collision geometry, as it was asked for"
@@ -174,10 +175,9 @@ def _check_outside(robot: LoadedRobot, tip: Tip) -> None:
         end = link.end()
         x, y, z = (float(f"{one:.4f}") + 0.0 for one in end.offset)
         raise SphshellError(
-            f"the sphere of radius {1e3 * tip.radius:.3g} mm on frame '{tip.frame}' is inside link "
-            f"'{link.link}', its center {1e3 * depth:.3g} mm deep: it can touch nothing; a ball at "
-            f"the end of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius "
-            f"{end.radius:g}"
+            f"the sphere of radius {mm(tip.radius)} on frame '{tip.frame}' is inside link "
+            f"'{link.link}', its center {mm(depth)} deep: it can touch nothing; a ball at the end "
+            f"of this link: --frame {tip.frame} --offset {x:g} {y:g} {z:g} --radius {end.radius:g}"
         )
 
 

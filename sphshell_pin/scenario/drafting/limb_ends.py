@@ -3,7 +3,6 @@
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import pinocchio as pin
@@ -44,8 +43,8 @@ class Tip:
     source: str
     ahead: Array | None = None
     """Out of a flat end (3,), against which a smaller one is drawn back; None: it has one size."""
-    end: Literal["", "round", "flat"] = ""
-    """The end of the link that the ball was made for: it covers a round one, is on a flat one."""
+    made: bool = False
+    """Whether the ball was made for the end of its link."""
 
     def at_most(self, radius: float) -> "Tip":
         """Return it with a `radius` [m] that is no larger, where its size is free."""
@@ -143,11 +142,11 @@ class LinkGeometry:
         fits = covers - before < _STANDS_OUT * covers and not self._on_rim
         if radius is None and fits and (self._free or not self._jaws):
             covering = f"it covers the end of link '{self.link}'"
-            return Tip(name, rounded(covers), center, covering, end="round")
+            return Tip(name, rounded(covers), center, covering, made=True)
         least = _OF_BODY * size if self._free else 0.0
         ball = rounded(max(_BALL * covers, least)) if radius is None else radius
         front, still = center + (before + ball) * ahead, ahead if radius is None else None
-        return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, "flat")
+        return Tip(name, ball, front, f"a ball on the end of link '{self.link}'", still, True)
 
     def _ahead(self) -> Array:
         """Return the unit vector (3,) towards the end, in the frame.

@@ -1,7 +1,7 @@
 """A new scenario from a robot and a surface, with values chosen for their sizes."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -71,28 +71,24 @@ def new_scenario(robot: StrPath, surface: StrPath = "plane", **options: Any) -> 
     raise refused
 
 
-def _instead(error: SphshellError, asked: Asked) -> list[tuple[str, Asked]]:
-    """Return what to try where that fails which is asked for: why, and what is asked instead."""
+def _instead(error: SphshellError, asked: Asked) -> Iterator[tuple[str, Asked]]:
+    """Yield what to try where that fails which is asked for: why, and what is asked instead."""
     said = str(error).partition(";")[0]
     if isinstance(error, CannotReach) and asked.tip is None:
-        others = error.others[:_MOST_ENDS] if asked.frame is None else ()
-        limbs = [
-            (f"frame '{one}', as with '{error.frame}' {said}", replace(asked, frame=one))
-            for one in others
-        ]
+        for one in error.others[:_MOST_ENDS] if asked.frame is None else ():
+            yield f"frame '{one}', as with '{error.frame}' {said}", replace(asked, frame=one)
         # A sphere of which the place is asked for stays there.
-        stays = asked.offset is not None or (asked.frame and asked.radius) or error.out is None
-        return limbs if stays else [*limbs, ("", replace(asked, tip=error.out))]
+        stays = asked.offset is not None or (asked.frame and asked.radius)
+        if error.out is not None and not stays:
+            yield "", replace(asked, tip=error.out)
     if isinstance(error, TooHeavy) and asked.against is None:
-        note = f"the part is of plastic, as with steel {said}"
-        return [(note, replace(asked, against="plastic"))]
+        yield f"the part is of plastic, as with steel {said}", replace(asked, against="plastic")
     if isinstance(error, RobotError) and asked.mimic:
         note = f"joints that are coupled move freely (--no-mimic), as else: {said}"
-        return [(note, replace(asked, mimic=False))]
+        yield note, replace(asked, mimic=False)
     if isinstance(error, CannotStand) and asked.base is None:
         note = f"the base is fixed, as the robot cannot stand on the surface: {error.reason}"
-        return [(note, replace(asked, base="fixed"))]
-    return []
+        yield note, replace(asked, base="fixed")
 
 
 def _written(asked: Asked) -> NewScenario:
@@ -229,22 +225,16 @@ def _robot_section(asked: Asked, path: Path) -> RobotSection:
                 f"mesh folders, xacro arguments and a density belong to a file, not to {robot}"
             )
         return RobotSection(name=str(robot), base=base, mimic=asked.mimic)
-    source: dict[str, Any] = {
-        "urdf" if file.suffix.lower() == ".urdf" else "file": _relative(file, path)
-    }
+    key = "urdf" if file.suffix.lower() == ".urdf" else "file"
+    source: dict[str, Any] = {key: os.path.relpath(file, path.parent)}
     return RobotSection(
         **source,
-        package_dirs=[_relative(Path(one), path) for one in asked.package_dirs],
+        package_dirs=[os.path.relpath(one, path.parent) for one in asked.package_dirs],
         xacro_args=dict(asked.xacro_args or {}),
         base=base,
         density=asked.density,
         mimic=asked.mimic,
     )
-
-
-def _relative(file: Path, path: Path) -> str:
-    """Return `file` relative to the scenario at `path`."""
-    return os.path.relpath(file, path.parent)
 
 
 def _build_bare(
@@ -270,7 +260,7 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
     if word is None:
         return ShellSection(
             name=file.stem.replace(".", "-"),
-            file=_relative(file, path),
+            file=os.path.relpath(file, path.parent),
             unit=asked.unit,
             bodies=None if asked.bodies is None else list(asked.bodies),
             faces=None if asked.faces is None else list(asked.faces),
@@ -283,8 +273,8 @@ def _shell_section(asked: Asked, path: Path, built: Built, tips: Sequence[Tip]) 
         said = f"not to the {word}, which is sized in meters"
         raise SphshellError(f"a unit, bodies and faces belong to a surface file, {said}")
     if asked.tips == "all" and word not in HELD_WORDS:
-        said = f"a hand cannot hold a {word}: --tips all takes {', '.join(HELD_WORDS)}"
-        raise SphshellError(said)
+        held = ", ".join(HELD_WORDS)
+        raise SphshellError(f"a hand cannot hold a {word}: --tips all takes {held}")
     largest = max(tip.radius for tip in tips)
     half, length = _IN_HAND * largest, 4 * _IN_HAND * largest
     if asked.tips == "one":

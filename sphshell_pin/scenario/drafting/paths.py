@@ -50,17 +50,15 @@ class Way:
         return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
-def find_way(
-    asked: Asked, place: Place, links: Links, radius: float, gap: float, room: float
-) -> Way:
+def find_way(asked: Asked, place: Place, links: Links, gap: float, room: float) -> Way:
     """Return the longest path that surface and joints allow from a `place`, of those tried.
 
-    The sphere of `radius` [m], whose `gap` [m] to the surface is that of the start, touches one
-    face along it, and the tip keeps its orientation unless that follows from its place. Links stay
-    `room` [m] off the part.
+    The sphere, whose `gap` [m] to the surface is that of the start, touches one face along it, and
+    the tip keeps its orientation unless that follows from its place. Links stay `room` [m] off the
+    part.
     """
     shell, stance, touch = links.shell, place.stance, place.touch
-    stays = touch.point[None]
+    radius, stays = stance.tip.radius, touch.point[None]
     if not place.on_face:
         why = "the sphere touches edges or several sides at once, wherever it was tried"
         return Way(stays, why=why, even=False)

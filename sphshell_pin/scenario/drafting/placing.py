@@ -50,8 +50,7 @@ class Place:
     def with_gap(self, gap: float) -> Place:
         """Return the place with the sphere at the `gap` [m] to the part, which stays if it can."""
         touch, stance = self.touch, self.stance
-        away = (stance.tip.radius + gap) * touch.normal - (touch.center - touch.point)
-        center = touch.center + away
+        center = touch.point + (stance.tip.radius + gap) * touch.normal
         moved, touched = stance.at(self.placement.act(center)), replace(touch, center=center)
         if moved is None:  # its joints do not move the tip that way
             way = self.placement.rotation @ (center - touch.center)

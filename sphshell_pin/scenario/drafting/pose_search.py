@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import counted
 from sphshell_pin.dynamics.scene.models import joint_of
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots import WORKING
@@ -34,7 +35,6 @@ from sphshell_pin.scenario.drafting.touch_points import (
 )
 from sphshell_pin.scenario.drafting.trial import Fault
 from sphshell_pin.scenario.drafting.vectors import nearest_axis
-from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.build import Built
 
 # Drafts that are run, in all and before a path is given up.
@@ -148,9 +148,9 @@ class PressSearch(Search):
             self.even |= found.on_face
             gap = press_gap(radius, force, stance.mass, pair)
             place = found.with_gap(gap)
-            way = find_way(asked, place, self.held, radius, gap, self.room)
-            hollow = asked.inside
-            yield Press(place, way, pair, force, gap, weak=not stance.force, hollow=hollow)
+            way = find_way(asked, place, self.held, gap, self.room)
+            weak, hollow = not stance.force, asked.inside
+            yield Press(place, way, pair, force, gap, weak=weak, hollow=hollow)
 
     def _places(self) -> Iterator[Place]:
         """Yield places of the part before the tip, those on the floor of the robot's base first.
@@ -166,8 +166,7 @@ class PressSearch(Search):
         else:
             word = {"cylinder": np.eye(3)[0], "bowl": np.eye(3)[2]}.get(asked.word or "")
             for side in sides(shell) if word is None else [word]:
-                spots = list(touch_points(shell, radius, gap, toward=side, inside=asked.inside))
-                choices.append((side, spots))
+                choices.append((side, list(touch_points(shell, radius, gap, side))))
         place = PLACES.get(asked.place or "")
         for approach in [np.array(place)] if place else approaches(self.limb, self.bench.q):
             # Upright ones first, as they stand in their file.
@@ -178,23 +177,22 @@ class PressSearch(Search):
 
     def refusal(self) -> SphshellError:
         """Return the error that says why no draft works, and what to change."""
-        place, bench, frame = self.asked.place, self.bench, self.tip.frame
-        ends = other_ends(self.model, frame)
-        if not bench.postures:
-            way = f"along {place}" if place else "along any axis"
-            return CannotReach(
-                f"the tip on frame '{frame}' cannot move {way} in any posture that was tried; its "
-                "joints do not allow it: take another --place or --frame",
-                frame,
-                ends,
-            )
+        bench, frame = self.bench, self.tip.frame
         ((link, _),) = bench.blocked.most_common(1) or [("", 0)]
-        if self.faults:
+        other_limb = bool(link)
+        if not bench.postures:
+            said = (
+                f"the tip on frame '{frame}' cannot move along {self.asked.place or 'any axis'} in "
+                "any posture that was tried; its joints do not allow it: take another --place or "
+                "--frame"
+            )
+            other_limb = True
+        elif self.faults:
             said = f"{self.failed()}; {_ADVICE[self.faults[-1].kind]}"
             # The force is held on faces, which links may have kept the tip from.
-            link = "" if self.even else link
+            other_limb = other_limb and not self.even
         elif self.refused:
-            said, link = self.refused[0], ""
+            said, other_limb = self.refused[0], False
         elif link:
             said = (
                 f"link '{link}' would be in the part, or another one: in each of "
@@ -203,6 +201,6 @@ class PressSearch(Search):
             )
         else:
             said = "the surface has no point to touch"
-        if not link:
+        if not other_limb:
             return SphshellError(said)
-        return CannotReach(said, frame, ends, bench.out_of_limb())
+        return CannotReach(said, frame, other_ends(self.model, frame), bench.out_of_limb())

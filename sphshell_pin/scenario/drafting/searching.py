@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pinocchio as pin
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import counted
 from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
@@ -19,7 +20,6 @@ from sphshell_pin.scenario.drafting.draft_text import draft_text
 from sphshell_pin.scenario.drafting.limb_ends import Tip
 from sphshell_pin.scenario.drafting.plan import Hold, Plan, Press
 from sphshell_pin.scenario.drafting.trial import Fault, try_out
-from sphshell_pin.scenario.drafting.wording import counted
 from sphshell_pin.scenario.format.bodies import joint_spans
 from sphshell_pin.scenario.format.build import Built, build_scenario, explain_built
 from sphshell_pin.scenario.format.reading import parse_scenario

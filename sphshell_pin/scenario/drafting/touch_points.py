@@ -11,7 +11,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.asked import Asked
 from sphshell_pin.scenario.drafting.vectors import nearest_axis, tangents, unit
-from sphshell_pin.scenario.drafting.wording import listed
+from sphshell_pin.scenario.drafting.wording import listed, mm
 from sphshell_pin.shell.faces import Face, described
 from sphshell_pin.shell.raw import KINDS, area_vectors, random_places
 from sphshell_pin.shell.shell import Shell
@@ -51,21 +51,15 @@ class TouchPoint:
 
 
 def find_touch_point(
-    shell: Shell,
-    radius: float,
-    gap: float,
-    *,
-    toward: Array,
-    inside: bool = False,
-    beside: Array | float = 0.0,
+    shell: Shell, radius: float, gap: float, *, toward: Array, beside: Array | float = 0.0
 ) -> TouchPoint:
     """Return a place in the middle of `shell` where a sphere of `radius` [m] has the `gap` [m].
 
-    It is touched from the side `toward` (3,), with `inside` from its middle. `beside` (3,) [m]
-    moves the place away from the middle.
+    It is touched from the side `toward` (3,), a hollow from its middle. `beside` (3,) [m] moves the
+    place away from the middle.
     """
     start = shell.box.mean(axis=0) + beside
-    if not inside:
+    if shell.side != "inside":
         # Far out above the middle or, over a hole, beside it.
         start = start + 2 * shell.size * toward
         if not _advance(shell, start, -toward, 0.0, 1e-6 * shell.size)[2]:
@@ -93,14 +87,13 @@ def sides(shell: Shell) -> list[Array]:
     return sorted(axes, key=rank)
 
 
-def touch_points(
-    shell: Shell, radius: float, gap: float, *, toward: Array, inside: bool = False
-) -> Iterator[TouchPoint]:
+def touch_points(shell: Shell, radius: float, gap: float, toward: Array) -> Iterator[TouchPoint]:
     """Yield touch points: that of `find_touch_point`, then those farthest from edges."""
-    middle, facing = shell.box.mean(axis=0), _facing(shell, -toward if inside else toward)
+    middle = shell.box.mean(axis=0)
+    facing = _facing(shell, -toward if shell.side == "inside" else toward)
     for point in (middle, *roomy_places(shell, facing)[0]):
         beside = point - middle - toward * (toward @ (point - middle))
-        yield find_touch_point(shell, radius, gap, toward=toward, inside=inside, beside=beside)
+        yield find_touch_point(shell, radius, gap, toward=toward, beside=beside)
 
 
 def widest_room(shell: Shell) -> float:
@@ -266,17 +259,16 @@ def asked_touches(asked: Asked, shell: Shell, radius: float, gap: float) -> list
     off = float(np.abs(shell.closest_points(point[None]).distances[0]))
     if off > _OFF * shell.size:
         raise SphshellError(
-            f"the place {listed(point)} is {1e3 * off:.3g} mm off the surface, which is in "
-            f"the box from {listed(shell.box[0])} to {listed(shell.box[1])} m: state it in "
-            "the part's own coordinates, in meters"
+            f"the place {listed(point)} is {mm(off)} off the surface, which is in the box from "
+            f"{listed(shell.box[0])} to {listed(shell.box[1])} m: state it in the part's own "
+            "coordinates, in meters"
         )
     spot = touch_from_outside(shell, point, radius, gap)
     beside = float(np.linalg.norm(spot.point - point)) - off
     if beside > _BESIDE * radius:
         raise SphshellError(
-            f"a sphere of radius {1e3 * radius:.3g} mm does not come to {listed(point)}: it "
-            f"touches the part {1e3 * beside:.3g} mm beside it; take a smaller --radius or "
-            "another --at"
+            f"a sphere of radius {mm(radius)} does not come to {listed(point)}: it touches the "
+            f"part {mm(beside)} beside it; take a smaller --radius or another --at"
         )
     return [spot]
 
@@ -310,9 +302,8 @@ def _on_face(shell: Shell, text: str, radius: float, gap: float) -> list[TouchPo
         if (away <= _BESIDE * radius).any():
             return [spots[k] for k in np.flatnonzero(away <= _BESIDE * radius)]
     raise SphshellError(
-        f"a sphere of radius {1e3 * radius:.3g} mm touches none of the {len(faces)} faces "
-        f"'{text}': it does not fit, or touches others first; take a smaller --radius or another "
-        "--at"
+        f"a sphere of radius {mm(radius)} touches none of the {len(faces)} faces '{text}': it does "
+        "not fit, or touches others first; take a smaller --radius or another --at"
     )
 
 

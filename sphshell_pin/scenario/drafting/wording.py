@@ -16,11 +16,6 @@ def mm(x: float) -> str:
     return f"{x * 1e3:.3g} mm"
 
 
-def counted(number: int, noun: str) -> str:
-    """Return "1 noun", "2 nouns"."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
 def listed(point: Iterable[float], form: str = ".4g") -> str:
     """Return numbers in brackets."""
     return f"[{', '.join(f'{one:{form}}' for one in point)}]"

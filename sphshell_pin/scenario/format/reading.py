@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from sphshell_pin.base.parameters import parameters_of
 from sphshell_pin.base.regular_file import MOST_TEXT, StrPath, read_text, why_no_file
+from sphshell_pin.base.texts import counted
 from sphshell_pin.dynamics.run.integrators import Integrator
 from sphshell_pin.dynamics.sensing.sensors import Sensor
 from sphshell_pin.errors import NameNotFound, ScenarioError, did_you_mean
@@ -366,7 +367,7 @@ def _explain(error: ValidationError, path: StrPath, data: Mapping[str, Toml]) ->
         reason = "must be a list [ ... ]"
     elif kind == "too_short":
         least, count = context["min_length"], context["actual_length"]
-        reason = f"must have at least {least} item{'s' * (least != 1)}, not {count}"
+        reason = f"must have at least {counted(least, 'item')}, not {count}"
     if len(details) > 1:
         reason += f" (and {len(details) - 1} more: first repair this one)"
     if kind not in ("model_type", "dataclass_type", "unknown_key"):

@@ -15,7 +15,7 @@ from sphshell_pin.dynamics.run.advance import AnyController
 from sphshell_pin.dynamics.run.open_run import OpenRun
 from sphshell_pin.dynamics.scene import models
 from sphshell_pin.dynamics.scene.joint_components import joint_slides
-from sphshell_pin.dynamics.scene.mimic import mimics
+from sphshell_pin.dynamics.scene.mimic import joint_angle, mimics
 from sphshell_pin.dynamics.scene.models import apparent_mass, find_frame, model_reach, set_joint
 from sphshell_pin.dynamics.scene.scene import Scene
 from sphshell_pin.errors import InvalidParameter, NameNotFound
@@ -168,10 +168,7 @@ def check_aim(targets: tuple[Target, ...], joint: str, value: float) -> None:
 
 
 def _target(model: pin.Model, joint: pin.JointModel, posture: Array) -> Target:
-    if joint.nq == 2:  # cosine and sine
-        value = float(np.arctan2(posture[joint.idx_q + 1], posture[joint.idx_q]))
-    else:
-        value = float(posture[joint.idx_q])
+    value = joint_angle(posture[joint.idx_q : joint.idx_q + joint.nq])
     rotates = not joint_slides(joint)
     low, high = -np.inf, np.inf
     if joint.nq == 1:

@@ -21,6 +21,7 @@ from OCP.TopoDS import TopoDS, TopoDS_Shape
 from OCP.XCAFApp import XCAFApp_Application
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
+from sphshell_pin.base.texts import free_name
 from sphshell_pin.errors import ShellFileError
 from sphshell_pin.shell.cad import model as cad_model
 from sphshell_pin.shell.cad.framing import check_frame
@@ -188,7 +189,7 @@ def _sort(
         for group in groups:
             own = part if len(groups) == 1 else name_of_body(group)
             name = own or (f"{part} {len(bodies) + 1}" if part else f"Body {len(bodies) + 1}")
-            bodies.append((_unique(name, [taken for taken, _ in bodies]), group))
+            bodies.append((free_name(name, [taken for taken, _ in bodies], " ({})"), group))
             for face in cad_model.subshapes(group, TopAbs_FACE):
                 # Endless: what OpenCASCADE makes of one whose surface or borders are damaged.
                 if cad_model.quick_box(face).IsOpen():
@@ -197,12 +198,3 @@ def _sort(
                 called = name_of_face(face) or f"Face {number}"
                 faces.append(cad_model.CadFace(TopoDS.Face(face), called, number, len(bodies) - 1))
     return tuple(faces), tuple(bodies)
-
-
-def _unique(name: str, taken: list[str]) -> str:
-    """Return `name`, numbered from its second time on."""
-    count, one = 1, name
-    while one in taken:
-        count += 1
-        one = f"{name} ({count})"
-    return one

@@ -11,6 +11,7 @@ from OCP.ShapeBuild import ShapeBuild_ReShape
 from OCP.ShapeUpgrade import ShapeUpgrade_ShapeDivideContinuity
 
 from sphshell_pin.base.arrays import Array
+from sphshell_pin.base.texts import counted
 from sphshell_pin.shell.cad.face_surface import FaceSurface
 from sphshell_pin.shell.cad.model import CadFace, CadModel, box_size, faces_of, take_unit
 from sphshell_pin.shell.cad.options import CadOptions, Occ
@@ -121,8 +122,7 @@ class CadSurface:
         count = len(model.faces)
         notes = [
             *model.notes,
-            f"{count} CAD face{'' if count == 1 else 's'}, tolerance of the file "
-            f"{model.tolerance * meters:.3g} m",
+            f"{counted(count, 'CAD face')}, tolerance of the file {model.tolerance * meters:.3g} m",
         ]
         if sewn.tolerance > 0.0:
             notes.append(

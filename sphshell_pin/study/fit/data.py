@@ -71,9 +71,8 @@ class Series:
 
     def until(self, end: float) -> "Series":
         """Return the values at the times up to `end` [s]."""
-        columns = (self.t, self.measured, self.fitted, self.sigma)
-        t, measured, fitted, sigma = (one[self.t <= end] for one in columns)
-        return replace(self, t=t, measured=measured, fitted=fitted, sigma=sigma)
+        columns = ("t", "measured", "fitted", "sigma")
+        return replace(self, **{one: getattr(self, one)[self.t <= end] for one in columns})
 
 
 @dataclass(frozen=True)
@@ -97,9 +96,8 @@ class _Table:
     def column(self, name: str, unit: str) -> Array:
         """Return the values (n,) of a column in the SI `unit`."""
         title, values = self.titles[self.names[name]], self.values[self.names[name]]
-        hint = "" if name == TIME else "; put nan where nothing was measured"
-        infinite = f"'{{:g}}' in column '{title}' is not a finite number{hint}"
-        self.check(np.isinf(values), values, infinite)
+        for row in np.flatnonzero(np.isinf(values)):
+            raise self.not_finite(f"{values[row]:g}", title, int(row))
         too_large = f"{{:g}} in column '{title}' is too large to compute with"
         self.check(np.abs(values) > _LARGEST, values, too_large)
         given = quantity_of(title)[1] if "[" in title else None
@@ -112,6 +110,12 @@ class _Table:
         """Raise DataError for the first row that is `wrong`; {} in the reason is its value."""
         for row in np.flatnonzero(wrong):
             raise self.fault(reason.format(values[row], values[row - 1]), int(row))
+
+    def not_finite(self, value: str, title: str, row: int) -> DataError:
+        """Return the error of a `value` that is no number, and how to leave it out."""
+        hint = "; leave the cell empty" if self.lines else "; put nan"
+        hint = "" if quantity_of(title)[0] == TIME else f"{hint} where nothing was measured"
+        return self.fault(f"'{value}' in column '{title}' is not a finite number{hint}", row)
 
     def fault(self, reason: str, row: int | None = None) -> DataError:
         if row is None or self.lines:
@@ -233,20 +237,16 @@ def _read_csv(path: Path) -> _Table:
     if all(_number(one) is not None for one in head):
         raise DataError(source, f"the first line must be a header, as '{_EXAMPLE}'", first)
     titles = [re.sub(r"\s*(\[[^\[\]]*\])$", r" \1", one.strip()) for one in head]  # t[s] is t [s]
-    values = np.full((len(titles), len(rows)), math.nan)
-    for k, (number, row) in enumerate(zip(numbers, rows, strict=True)):
+    table = _Table(source, titles, np.full((len(titles), len(rows)), math.nan), numbers)
+    for k, row in enumerate(rows):
         if len(row) != len(head):
-            reason = f"has {len(row)} values, the header has {len(head)} columns"
-            raise DataError(source, reason, number)
-        for i, cell in enumerate(row):
-            found = _number(cell) if cell.strip() else math.nan
+            raise table.fault(f"has {len(row)} values, the header has {len(head)} columns", k)
+        for i, cell in enumerate(map(str.strip, row)):
+            found = _number(cell) if cell else math.nan
             if found is None:
-                timed = quantity_of(titles[i])[0] == TIME
-                hint = "" if timed else "; leave the cell empty where nothing was measured"
-                reason = f"'{cell.strip()}' in column '{titles[i]}' is not a finite number{hint}"
-                raise DataError(source, reason, number)
-            values[i, k] = found
-    return _Table(source, titles, values, numbers)
+                raise table.not_finite(cell, titles[i], k)
+            table.values[i, k] = found
+    return table
 
 
 def _number(text: str) -> float | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sphshell_pin.base.regular_file import StrPath
+from sphshell_pin.base.texts import counted
 from sphshell_pin.errors import InvalidParameter
 from sphshell_pin.scenario.format import reading
 from sphshell_pin.scenario.format.build import build_scenario
@@ -95,6 +96,5 @@ def _trials(
     size = sum(len(one.t) for trial in trials for one in trial.data)
     if size <= len(free):
         must = f"must be more than parameters, of which there are {len(free)}"
-        given_as = f"with {size} value{'s' * (size != 1)}"
-        raise InvalidParameter("data", size, must, given=given_as)
+        raise InvalidParameter("data", size, must, given=f"with {counted(size, 'value')}")
     return trials

@@ -52,13 +52,9 @@ class Trial:
                 warnings.simplefilter("ignore", kind)
             built = rebuild(self.built, changes or {}, anew=True)
             sensors = [_quiet(sensor) for sensor in built.simulation.sensors]
+            run, step = built.scenario.run, row_step(t) or None
             result = sp.Simulation(built.scene, built.simulation.integrator, sensors).run(
-                built.q0,
-                built.v0,
-                float(t[-1]),
-                built.controller,
-                built.scenario.run.control_dt,
-                record_dt=row_step(t) or None,
+                built.q0, built.v0, float(t[-1]), built.controller, run.control_dt, record_dt=step
             )
         return quantities_of(result, built.scene, t, wanted)
 
@@ -115,12 +111,12 @@ class Search:
         if patterned(self._compared()):
             # It may be where one pulse of the run lies on another one of the data. Both ends are
             # judged by their likelihood: weights of its own make every end look good.
-            ends = [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
+            ends = [self._end()]
             self.x = self._grown()
             if np.isfinite(self._values(self.x)).all():
                 self._settle()
-                ends += [(self._negative_log_likelihood(), self.x, self.sigma, self.converged)]
-            _, self.x, self.sigma, self.converged = min(ends, key=lambda one: one[0])
+                ends.append(self._end())
+            _, self.x, self.sigma, self.converged = min(ends, key=lambda end: end[0])
 
     def _settle(self) -> None:
         """Search from where it is, until weights that are estimated from residuals stay."""
@@ -148,10 +144,10 @@ class Search:
                     x = part.x
         return x
 
-    def _negative_log_likelihood(self) -> float:
-        """Return the negative logarithm of the data's likelihood at x, less a constant."""
-        squares = ((self.measured - self._values(self.x)) / self.sigma) ** 2
-        return float(np.sum(np.log(self.sigma) + 0.5 * squares))
+    def _end(self) -> tuple[float, Array, Array, bool]:
+        """Return the negative log-likelihood at x, less a constant, x, sigma, and `converged`."""
+        unlikely = np.sum(np.log(self.sigma) + 0.5 * self._residuals(self.x) ** 2)
+        return float(unlikely), self.x, self.sigma, self.converged
 
     def _compared(self) -> tuple[Series, ...]:
         """Return the data with what the run at x says of them."""
@@ -328,7 +324,7 @@ def covariance_of(jacobian: Array, error: Array) -> tuple[Array, list[list[int]]
 def _quiet(sensor: Sensor) -> Sensor:
     """Return a sensor without noise: the data have their own."""
     noise = [one.name for one in fields(sensor) if one.name.endswith("noise")]
-    return replace(sensor, **dict.fromkeys(noise, 0.0)) if noise else sensor  # type: ignore[arg-type]
+    return replace(sensor, **dict.fromkeys(noise, 0.0))  # type: ignore[arg-type]
 
 
 def _fitted(one: Free, unit: str, x: float, beyond: float, half: float) -> Fitted:

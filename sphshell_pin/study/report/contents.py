@@ -23,6 +23,7 @@ Progress = Callable[[float], None]
 Value = str | float | None
 
 TIMES = "\u00d7"  # the unit of ratios
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 class Spread(NamedTuple):
@@ -221,15 +222,10 @@ def number(value: float | None) -> str:
         return "0"
     if size < 1e-3 or size >= 1e6:
         digits, _, exponent = f"{value:.1e}".partition("e")
-        return f"{digits}\u00d710{superscript(int(exponent))}"
+        return f"{digits}{TIMES}10{str(int(exponent)).translate(_RAISED)}"
     if size >= 1e3:
         return f"{value:,.0f}".replace(",", "\u202f")
     return f"{value:.3g}"
-
-
-def superscript(exponent: int) -> str:
-    """Return an integer as superscript."""
-    return str(exponent).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def with_unit(value: float, unit: str) -> str:

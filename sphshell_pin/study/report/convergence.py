@@ -20,7 +20,7 @@ import numpy as np
 from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.study.report import contents
-from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES, Surface
+from sphshell_pin.study.report.surfaces import DEPTH, RADIUS, SURFACES
 from sphshell_pin.study.report.timing import part, per_center, silent, take_turns
 
 PLACES = 300
@@ -38,10 +38,9 @@ class Row:
     side: float  # mean side of the elements / radius of the sphere
     mean: float
     largest: float
-    query: float = math.nan  # median time [s]
+    query: float = math.nan  # median time [s], once it is measured
 
 
-REPORTED = ("bowl", "dome", "torus", "flat plate")
 SMOOTH, ESTIMATED = "smooth, exact normals", "smooth, estimated normals"
 # Method, and whether the shell is given the exact normals.
 RULES = {
@@ -61,14 +60,9 @@ def relative_forces(shell: Shell, method: str, centers: Array) -> Array:
     return forces
 
 
-def measure(
-    name: str,
-    surface: Surface,
-    rounds: int = 0,
-    progress: contents.Progress = silent,
-    finest: int = 5,
-) -> list[Row]:
+def measure(name: str, rounds: int, finest: int, progress: contents.Progress = silent) -> list[Row]:
     """Measure every rule on the first `finest` meshes of a surface; queries timed in `rounds`."""
+    surface = SURFACES[name]
     centers, normals = surface.touching(0, PLACES)
     elsewhere, _ = surface.touching(1, TIMED_PLACES)
     rows, contestants = [], {}
@@ -84,8 +78,6 @@ def measure(
             rows.append(Row(name, label, *size, float(off.mean()), float(off.max())))
             contestants[len(rows) - 1] = query_contestant(shell, elsewhere, RADIUS, method)
         progress(0.5 * (k + 1) / len(meshes))
-    if rounds == 0:
-        return rows
     times = take_turns(contestants, rounds, part(progress, 0.5, 1.0))
     return [replace(row, query=float(np.median(times[k]))) for k, row in enumerate(rows)]
 
@@ -94,31 +86,30 @@ def query_contestant(
     shell: Shell, centers: Array, radius: float, method: str
 ) -> Callable[[], float]:
     """Return what asks the shell for the contacts of all spheres and times one of them."""
-    radii = np.full(len(centers), radius)
     return per_center(
-        lambda: shell.contacts_batch(centers, radii, method=method, threads=1), len(centers)
+        lambda: shell.contacts_batch(centers, radius, method=method, threads=1), len(centers)
     )
 
 
 KEY, TITLE = "forces", "Error of the contact force"
 CURVED = ("bowl", "dome", "torus")
 AT = 0.3  # h / r at which errors are compared
-TEXT = contents.about(__doc__)
 
 
 def section(*, quick: bool, progress: contents.Progress) -> contents.Section:
     """Measure and return the section."""
     rows: list[Row] = []
     rounds, finest = (3, 4) if quick else (7, 5)
-    for k, name in enumerate(REPORTED):
-        share = part(progress, k / len(REPORTED), (k + 1) / len(REPORTED))
-        rows += measure(name, SURFACES[name], rounds, share, finest)
+    for k, name in enumerate(SURFACES):
+        share = part(progress, k / len(SURFACES), (k + 1) / len(SURFACES))
+        rows += measure(name, rounds, finest, share)
     return assemble(rows)
 
 
 def assemble(rows: list[Row]) -> contents.Section:
     """Return the section of measured rows."""
-    return contents.Section(KEY, TITLE, TEXT, findings_of(rows), [orders_table(rows)])
+    findings, tables = findings_of(rows), [orders_table(rows)]
+    return contents.Section(KEY, TITLE, contents.about(__doc__), findings, tables)
 
 
 def of(rows: list[Row], surface: str, rule: str) -> list[Row]:
@@ -132,11 +123,11 @@ def order(line: list[Row]) -> float:
     return float(np.polyfit(np.log(side), np.log(error), 1)[0])
 
 
-def error_at(line: list[Row], which: str = "mean", side: float = AT) -> float:
-    """Return the mean or largest error at h / r, between two meshes by a power law."""
+def error_at(line: list[Row], which: str = "mean") -> float:
+    """Return the mean or largest error at h / r = AT, between two meshes by a power law."""
     sides = np.log([row.side for row in reversed(line)])
     errors = np.log([getattr(row, which) for row in reversed(line)])
-    return float(np.exp(np.interp(np.log(side), sides, errors)))
+    return float(np.exp(np.interp(np.log(AT), sides, errors)))
 
 
 def findings_of(rows: list[Row]) -> list[contents.Finding]:
@@ -165,14 +156,12 @@ def findings_of(rows: list[Row]) -> list[contents.Finding]:
 def orders_table(rows: list[Row]) -> contents.Table:
     """Return order and error at h / r = AT of every method on every surface."""
     cells = []
-    for name, rule in product(REPORTED, RULES):
+    for name, rule in product(SURFACES, RULES):
         line = of(rows, name, rule)
-        fine, exact = line[-1], max(row.largest for row in line) < 1e-12
-        errors = error_at(line), error_at(line, "largest")
-        cells.append(
-            (name, rule, None if exact else order(line), *errors)
-            + (fine.triangles, fine.mean, fine.query)
-        )
+        exact = max(row.largest for row in line) < 1e-12
+        errors = None if exact else order(line), error_at(line), error_at(line, "largest")
+        finest = line[-1].triangles, line[-1].mean, line[-1].query
+        cells.append((name, rule, *errors, *finest))
     return contents.Table(
         "forces_orders",
         "Orders by a fit over all meshes; none where the force is exact at any size.",

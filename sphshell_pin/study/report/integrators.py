@@ -21,7 +21,6 @@ from sphshell_pin.study.report.timing import silent
 KEY, TITLE = "integrators", "Work and precision of the integrators"
 EXPLICIT = ("SemiImplicitEuler", "RungeKutta4", "Adaptive")
 ERRORS = {1e-2: "10⁻²", 1e-4: "10⁻⁴", 1e-6: "10⁻⁶"}
-TEXT = contents.about(__doc__)
 
 
 @dataclass(frozen=True)
@@ -108,4 +107,4 @@ def assemble(rows: list[Row], swings: swing.Row) -> contents.Section:
         contents.Finding("stiff_cost", cost, stiff, contents.TIMES),
         contents.Finding("bounces_error", least, min(bounce, default=math.nan)),
     ]
-    return contents.Section(KEY, TITLE, TEXT, findings, tables=[costs])
+    return contents.Section(KEY, TITLE, contents.about(__doc__), findings, tables=[costs])

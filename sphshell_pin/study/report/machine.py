@@ -12,18 +12,7 @@ BUSY = 0.5
 """Load before the measurements from which on a report says that the machine was busy."""
 
 # Distributions whose speed shows on the page, in its order; others are left out.
-PACKAGES = (
-    "sphshell-pin",
-    "pin",
-    "coal",
-    "numpy",
-    "trimesh",
-    "libigl",
-    "fcpw",
-    "mujoco",
-    "drake",
-    "pybullet",
-)
+PACKAGES = "sphshell-pin pin coal numpy trimesh libigl fcpw mujoco drake pybullet"
 
 
 def caution_of(load: float) -> str:
@@ -45,7 +34,7 @@ def describe(command: str) -> dict[str, str]:
         if model := re.search(r"^model name\s*:\s*(.+)", text, re.MULTILINE):
             processor = model[1]
     versions = []
-    for name in PACKAGES:
+    for name in PACKAGES.split():
         with contextlib.suppress(metadata.PackageNotFoundError):
             versions.append(f"{name} {metadata.version(name)}")
     found = {

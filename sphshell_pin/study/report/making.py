@@ -21,7 +21,6 @@ from sphshell_pin.study.report.machine import caution_of, describe
 from sphshell_pin.study.report.page import render
 
 PAGE, DATA = "report.md", "report.json"
-_OWN = (".csv", ".png")  # of earlier versions, too
 _STATED = ("key", "title", "error", "seconds", "notes")
 Tell = Callable[[str, float], None]
 """Called with the section's title and the share of all that is done."""
@@ -83,30 +82,24 @@ def make_report(
         Where the folder cannot be written.
     """
     with held_folder(out, DATA) as place:
-        report = _measure(parts or PARTS, quick, command, tell)
+        report = _measure(parts or PARTS, quick, command, tell or (lambda title, share: None))
         _write(report, out, place)
     return report
 
 
-def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell | None) -> Report:
+def _measure(parts: Sequence[Part], quick: bool, command: str, tell: Tell) -> Report:
     begin, load = time.perf_counter(), os.getloadavg()[0]
     machine = describe(command)
     whole = sum(part.seconds[not quick] for part in parts)
     sections, done = [], 0.0
     for part in parts:
-        share = part.seconds[not quick] / whole
-        progress = partial(_tell, tell, part.title, done, share)
+        begun, done = done, done + part.seconds[not quick] / whole
+        progress = timing.part(partial(tell, part.title), begun, done)
         progress(0.0)
         sections.append(measured(part, quick=quick, progress=progress))
-        done += share
     machine["measured in"] = f"{time.perf_counter() - begin:.0f} s{', quick' if quick else ''}"
     machine["load before"] = f"{load:.2f}"
     return Report(sections, machine, caution=caution_of(load))
-
-
-def _tell(tell: Tell | None, title: str, base: float, share: float, of_part: float) -> None:
-    if tell is not None:
-        tell(title, base + share * of_part)
 
 
 def measured(part: Part, *, quick: bool, progress: Progress) -> Section:
@@ -138,10 +131,10 @@ def _write(report: Report, out: Path, place: AtomicFolder) -> None:
 
 
 def _files_of_old(out: Path) -> list[str]:
-    """Return the tables and pictures of the report that is in the folder."""
+    """Return the tables of the report that is in the folder."""
     try:
         names = json.loads(read_text(out / DATA))["files"]
-        return [name for name in names if Path(name).name == name and name.endswith(_OWN)]
+        return [name for name in names if Path(name).name == name and name.endswith(".csv")]
     except (OSError, ValueError, LookupError, TypeError, AttributeError):
         return []
 

@@ -1,5 +1,6 @@
 """The page: Markdown, with the tables that stand beside it."""
 
+from sphshell_pin.base.texts import counted
 from sphshell_pin.study.report.contents import Section, findings_table
 
 TITLE, TEXT = (
@@ -15,7 +16,7 @@ def tally_of(sections: list[Section]) -> str:
     """Return how many aims are met, in a sentence or two."""
     judged = [f.met for section in sections for f in section.findings if f.met is not None]
     failed = sum(section.error is not None for section in sections)
-    more = f" {failed} section{'s' * (failed > 1)} could not be measured." if failed else ""
+    more = f" {counted(failed, 'section')} could not be measured." if failed else ""
     return f"{sum(judged)} of {len(judged)} aims are met.{more}"
 
 

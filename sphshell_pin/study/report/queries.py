@@ -26,7 +26,6 @@ FEW, COMPARED, MANY = 32, 316, 1000
 SIDE = 1 / 316  # of a cell [m]
 CENTERS, COAL_CENTERS = 20_000, 2000
 OURS, FLAT, COAL = "smooth", "facets", "coal::collide"
-TEXT = contents.about(__doc__)
 Times = dict[tuple[str, int], Array]
 """Times of a query [s] (rounds,) by the code and the number of triangles."""
 
@@ -93,4 +92,4 @@ def assemble(times: Times) -> contents.Section:
     )
     left_out = f"--quick leaves out {contents.number(2 * MANY**2)} triangles."
     notes = [] if sizes[-1] == 2 * MANY**2 else [left_out]
-    return contents.Section(KEY, TITLE, TEXT, findings=findings, tables=[table], notes=notes)
+    return contents.Section(KEY, TITLE, contents.about(__doc__), findings, [table], notes)

@@ -91,10 +91,14 @@ def torus(ring: float, tube: float, side: float) -> Mesh:
     next_i, next_j = (i + 1) % rows, (j + 1) % columns
     a, b = i * columns + j, next_i * columns + j
     c, d = next_i * columns + next_j, i * columns + next_j
+    return Mesh(vertices, random_halves(a, b, c, d, rng), normals)
+
+
+def random_halves(a: Ints, b: Ints, c: Ints, d: Ints, rng: np.random.Generator) -> Ints:
+    """Return cells with corners a, b, c, d (n,) in turn as triangles, by diagonals at random."""
     first = rng.random(len(a)) < 0.5
-    halves = (np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d]))
-    triangles = np.concatenate([half.T for half in halves]).astype(np.int32)
-    return Mesh(vertices, triangles, normals)
+    halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
+    return np.hstack(halves).T.astype(np.int32)
 
 
 def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, Ints]:
@@ -105,9 +109,7 @@ def random_grid(cells: int, half: float, seed: int = 1) -> tuple[Array, Array, I
     inner = np.maximum(np.abs(x), np.abs(y)) < half * (1 - 1e-9)
     x, y = (k + inner * rng.uniform(-0.4, 0.4, len(k)) * half / cells for k in (x, y))
     (a, b, c), (_, _, d) = (part.T for part in np.split(triangles, 2))
-    first = rng.random(len(a)) < 0.5
-    halves = np.where(first, [a, b, c], [a, b, d]), np.where(first, [a, c, d], [b, c, d])
-    return x, y, np.hstack(halves).T.astype(np.int32)
+    return x, y, random_halves(a, b, c, d, rng)
 
 
 def plate(side: float, half: float) -> Mesh:

@@ -1,7 +1,6 @@
 """Period and energy of a ball that swings in a bowl without friction, against the exact bowl."""
 
 import math
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,6 @@ from scipy.interpolate import CubicHermiteSpline
 
 from sphshell_pin import ImpactLaw, RungeKutta4, Scene, Shell, Simulation, Sphere
 from sphshell_pin.base.arrays import Array
-from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report.models import model_of
 from sphshell_pin.study.report.surfaces import Mesh, icosphere
 
@@ -39,16 +37,16 @@ class Row(NamedTuple):
     energy: float
 
 
-def any_turn() -> Array:
-    """Return a rotation that puts the mirror planes of the icosphere off every swing."""
-    return np.asarray(pin.utils.rpyToMatrix(0.4, 1.1, 2.3))
+def turned_icosphere(level: int, radius: float) -> Mesh:
+    """Return a sphere [m] of 20 * 4^level triangles, no mirror plane of which holds a swing."""
+    mesh = icosphere(level, radius)
+    turn = pin.utils.rpyToMatrix(0.4, 1.1, 2.3).T
+    return Mesh(mesh.vertices @ turn, mesh.triangles, mesh.normals @ turn)
 
 
-def bowl(side: float, turn: Array | None = None) -> Mesh:
+def bowl(side: float) -> Mesh:
     """Return the sphere whose elements have sides of `side` radii of the ball, as in LEVELS."""
-    mesh = icosphere(LEVELS[side], BOWL)
-    turn = any_turn() if turn is None else turn
-    return Mesh(mesh.vertices @ turn.T, mesh.triangles, mesh.normals @ turn.T)
+    return turned_icosphere(LEVELS[side], BOWL)
 
 
 def ball_model() -> pin.Model:
@@ -57,12 +55,12 @@ def ball_model() -> pin.Model:
     return model_of(("ball", pin.JointModelTranslation(), inertia), gravity=GRAVITY)
 
 
-def mesh_scene(mesh: Mesh, method: str = "smooth", exact_normals: bool = True) -> Scene:
+def mesh_scene(mesh: Mesh, exact_normals: bool = True) -> Scene:
     """Return the ball and the surface of a mesh."""
     normals = mesh.normals if exact_normals else None
     shell = Shell(mesh.vertices, mesh.triangles, normals=normals)
     scene = Scene(ball_model())
-    scene.add_contact(Sphere(RADIUS, "ball"), shell, law=LAW, method=method)
+    scene.add_contact(Sphere(RADIUS, "ball"), shell, law=LAW)
     return scene
 
 
@@ -92,33 +90,20 @@ def mean_period(t: Array, x: Array, v: Array, periods: int) -> float:
     return float(crossings[periods] - crossings[0]) / periods
 
 
-def energy_changes(result: Result, swing_energy: float = ENERGY) -> Array:
-    """Return (E(t) - E(0)) / energy of the swing; E is kinetic, of gravity and of the contacts."""
-    return np.asarray(result.energy.residual / swing_energy)
-
-
-def swing(
-    scene: Scene, azimuth: float, dt: float = DT, periods: int = PERIODS
-) -> tuple[float, float]:
+def swing(scene: Scene, azimuth: float, periods: int = PERIODS) -> tuple[float, float]:
     """Let the ball go at `azimuth` for a third of a period more than `periods`.
 
     Returns the mean period [s] and the largest change of energy / energy of the swing.
     """
-    result = Simulation(scene, RungeKutta4(dt)).run(
-        start(azimuth), duration=(periods + 0.35) * PERIOD
-    )
+    duration = (periods + 0.35) * PERIOD
+    result = Simulation(scene, RungeKutta4(DT)).run(start(azimuth), duration=duration)
     along = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
     period = mean_period(result.t, result.q @ along, result.v @ along, periods)
-    return period, float(np.abs(energy_changes(result)).max())
+    return period, float(np.abs(result.energy.residual).max() / ENERGY)
 
 
-def measure(
-    scene: Scene,
-    azimuths: Sequence[float] | Array = AZIMUTHS,
-    dt: float = DT,
-    periods: int = PERIODS,
-) -> Row:
+def measure(scene: Scene, azimuths: Array = AZIMUTHS, periods: int = PERIODS) -> Row:
     """Swing in every direction."""
-    runs = np.array([swing(scene, float(azimuth), dt, periods) for azimuth in azimuths])
+    runs = np.array([swing(scene, float(azimuth), periods) for azimuth in azimuths])
     errors = runs[:, 0] / PERIOD - 1
     return Row(float(np.sqrt(np.mean(errors**2))), float(runs[:, 1].max()))

@@ -30,7 +30,7 @@ def test_the_period_is_that_of_the_exact_bowl() -> None:
     found = solve_ivp(motion, (0.0, 1.6), first, "DOP853", events=falls, rtol=1e-12, atol=1e-14)
     crossings = found.t_events[0]
     assert (crossings[4] - crossings[0]) / 4 == pytest.approx(swing.PERIOD, rel=2e-10)
-    period, _ = swing.swing(exact_scene(), 0.7, swing.DT, PERIODS)
+    period, _ = swing.swing(exact_scene(), 0.7, PERIODS)
     assert period == pytest.approx(swing.PERIOD, rel=1e-9)
     assert (
         pytest.approx(swing.MASS * swing.GRAVITY * swing.ARM * (1 - np.cos(swing.ANGLE)))
@@ -42,7 +42,7 @@ def test_the_period_is_that_of_the_exact_bowl() -> None:
 @pytest.mark.parametrize("side", BARS)
 def test_period_and_energy(side: float, exact_normals: bool) -> None:
     scene = swing.mesh_scene(swing.bowl(side), exact_normals=exact_normals)
-    row = swing.measure(scene, swing.AZIMUTHS[::2], swing.DT, PERIODS)
+    row = swing.measure(scene, swing.AZIMUTHS[::2], PERIODS)
     period_bar, energy_bar = BARS[side]
     assert row.rms <= period_bar / BETTER
     assert row.energy <= energy_bar / BETTER
