@@ -62,6 +62,9 @@ def test_a_joint_that_turns_without_end_has_an_angle() -> None:
     q[:3] = np.cos(2.5), np.sin(2.5), 0.25
     assert curves["q.wheel"].of(q[None]) == pytest.approx(np.rad2deg(2.5))
     assert curves["q.slide"].of(q[None]) == 250.0
+    v = np.linspace(0.1, 0.8, model.nv)
+    assert curves["v.wheel"].of(v[None]) == pytest.approx(np.rad2deg(0.1))
+    assert curves["v.slide"].of(v[None]) == 200.0
     units = {"q.wheel": "deg", "q.slide": "mm", "q.free.0": "mm", "q.free.6": ""}
     units |= {
         "v.free.5": "deg/s",
