@@ -27,9 +27,8 @@ nb::list parameters_of(const std::string& kind) {
   return std::move(lister.rows);
 }
 
-// A family whose member `law` holds one of its kinds.
-// A law by its name and the numbers of its dataclass, the names of all, and what C++ states of
-// their parameters: what a new kind needs on this side.
+// Binds a family, whose member `law` holds one of its kinds: made by the name of a kind and the
+// numbers of its dataclass, with the names of all kinds and what C++ states of their parameters.
 template <class Law>
 nb::class_<Law> bind_family(nb::module_& m, const char* name, nb::type_slots parts) {
   using Family = Kinds<decltype(Law::law)>;

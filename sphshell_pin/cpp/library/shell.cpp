@@ -53,10 +53,9 @@ bool is_flat(const Points& p, const Triangle& t) {
   return !((b - a).cross(c - a).norm() > 2 * kFlatArea * longest);
 }
 
-// Whether a quad is split between its corners 1 and 3, and not 0 and 2: see examine_quads in
-// sphshell_pin/shell/polygons.py.
-// The diagonal whose worse triangle has the better shape; of equal ones that at the smallest point,
-// which does not depend on the numbering.
+// Whether a quad is split between its corners 1 and 3, and not 0 and 2, as examine_quads in
+// sphshell_pin/shell/polygons.py does: by the diagonal whose worse triangle has the better shape;
+// of equal ones by that at the smallest point, which does not depend on the numbering.
 bool other_diagonal(const std::array<Vec3, 4>& p) {
   Vec3 normal = (p[2] - p[0]).cross(p[3] - p[1]);
   const double length = normal.norm();

@@ -22,8 +22,8 @@ double coordinate_scale(const std::vector<Vec3>& vertices, const std::vector<Tri
   return box.diagonal().norm() + box.min().cwiseAbs().cwiseMax(box.max().cwiseAbs()).maxCoeff();
 }
 
-// Twice the area vector. Of a needle only the two shorter edges give an accurate one.
-// The cross product of the two shorter edges: the rounding of the longest one does not enter.
+// Twice the area vector: the cross product of the two shorter edges, so that the rounding of a
+// needle's longest one does not enter.
 Vec3 area_vector(const std::vector<Vec3>& v, const Triangle& t) {
   int apex = 0;  // opposite the longest edge
   double longest = -1;

@@ -223,10 +223,9 @@ ContactShape Curvature::shape_at(const Place& place, double depth, const Vec3& c
     out.gradient[i] =
         (slope.array() * CurvatureField::matrix(local_by.col(i).head<6>()).array()).sum() -
         turn.dot(motion.normal.col(i));
-  // The rise comes on with the depth, so that a touch begins where it is found.
-  // With size = |rise| and x = depth / size the corrected depth is depth + rise (1 - e^-x) for rise
-  // > 0 and depth - size (1 - e^-x) for rise < 0: zero at zero depth, the full rise a few sizes
-  // deeper. Its derivative gives the tilt.
+  // The rise comes on with the depth, so that a touch begins where it is found: with size = |rise|
+  // and x = depth / size the corrected depth is depth + rise (1 - e^-x), zero at zero depth, with
+  // the full rise a few sizes deeper. Its derivative gives the tilt.
   const double rise = local[6];
   const double size = std::abs(rise), x = rise == 0 ? 0 : depth / size;
   const double share = rise == 0 ? 0 : std::exp(-x);

@@ -19,8 +19,8 @@ bool is_reversed(const Shell& shell, int half_edge, int other) {
   return vertex_of(shell, half_edge) != vertex_of(shell, other);
 }
 
-// How fast the normals of an element turn: the most along a side [1/m].
-// By the chord of the normals over the chord of the corners.
+// How fast the normals of an element turn, the most along a side [1/m]: the chord of the normals
+// over that of the corners.
 double bend_of(const Shell& shell, int facet) {
   if (shell.curved()->facets()[facet].flat) return 0;
   const Facet& flat = shell.facets()[facet];
@@ -92,9 +92,8 @@ CurvatureField::Tensor CurvatureField::tensor(const Mat3& m) {
   return out;
 }
 
-// The tensors at a third and two thirds of a side, as the fits of the element say.
-// By the fit's tensor and its derivative along the side: a cubic in Bezier form has b1 = b0 + b0' /
-// 3.
+// The tensors at a third and two thirds of a side, by the fits' tensors at its ends and their
+// derivatives along it: a cubic in Bezier form has b1 = b0 + b0' / 3.
 std::pair<CurvatureField::Tensor, CurvatureField::Tensor> CurvatureField::along_side(int facet,
                                                                                      int side) {
   const CurvedFacet& curved = shell_->curved()->facets()[facet];

@@ -5,8 +5,8 @@
 
 namespace sphshell {
 
-// Where two sides go on into each other at their corner, that of a point next to it.
-// Unit, x_u x x_v.
+// The unit normal x_u x x_v; where two sides go on into each other at their corner, that of a point
+// next to it.
 inline Vec3 normal_of(const CubicPatch& patch, double u, double v) {
   const Vec3 xu = patch.along_u(u, v), xv = patch.along_v(u, v), n = xu.cross(xv);
   if (n.squaredNorm() > 1e-16 * xu.squaredNorm() * xv.squaredNorm()) return n.normalized();

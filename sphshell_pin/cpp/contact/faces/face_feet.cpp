@@ -329,8 +329,8 @@ SideFoot nearest_on_side(const Shell& shell, int f, int k, const Probe& probe) {
     x += moved;
     if (moved.squaredNorm() < 1e-30 * from.squaredNorm()) break;
   }
-  // Beyond an end that end is the nearest.
-  // Regions of features overlap by this: no center is between two of them.
+  // Beyond an end that end is the nearest. Regions of features overlap by `gap`: no center is
+  // between two of them.
   const double gap = surface.gap();
   const bool before =
       probe.pull(p).dot(tangent_at(p)) <= -gap || (x - p).dot(chord) <= -gap * chord.norm();

@@ -90,8 +90,7 @@ bool circle_of_border(const Shell& shell, const Minimum& at, const Vec3& center,
   return true;
 }
 
-// The angle [rad] of a side about the axis of its circle.
-// By atan2, so that half a turn is accurate too.
+// The angle [rad] of a side about the axis of its circle, accurate up to half a turn.
 double angle_of(const Shell& shell, const Minimum& at, const Circle& circle) {
   const Facet& facet = shell.facets()[at.facet];
   const Vec3 p = facet.corner[at.index] - circle.middle;

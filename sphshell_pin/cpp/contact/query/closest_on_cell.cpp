@@ -9,10 +9,9 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 
-// |x(u, v) - c|^2 / 2 at a point of a patch: half the square of the distance, with its first
-// derivatives and the second ones, those of a plane first. Of a Plane, the height, scaled.
-// With f = |x(u, v) - c|^2 / 2: f_u = (x - c) . x_u and f_uv = x_u . x_v + (x - c) . x_uv. The fuu,
-// fuv, fvv are the first term alone, the metric of the surface; huu, huv, hvv are the Hessian.
+// Derivatives of f = |x(u, v) - c|^2 / 2 at a point of a patch (of a Plane, of the height, scaled):
+// f_u = (x - c) . x_u and f_uv = x_u . x_v + (x - c) . x_uv. The fuu, fuv, fvv are the first term
+// alone, the metric of the surface; huu, huv, hvv are the Hessian.
 struct Expansion {
   Vec3 from;  // x - c
   double gu, gv, fuu, fuv, fvv;
@@ -130,8 +129,8 @@ class CellSearch {
   }
 
  private:
-  // Bound on the size of the third derivatives, over the facet.
-  // The Frobenius norm, with each mixed derivative counted as often as it occurs.
+  // Bound on the size of the third derivatives, over the facet: the Frobenius norm, with each mixed
+  // derivative counted as often as it occurs.
   double third(const Vec3& uuu, const Vec3& uuv, const Vec3& uvv, const Vec3& vvv) const {
     // d/dx = d/du / a; d/dy = (d/dv - (b / a) d/du) / c.
     const double p = axes_.b / axes_.a, a = axes_.a, c = axes_.c;
@@ -174,16 +173,15 @@ class CellSearch {
     for (const Corners& part : quarters(corner)) look_into(part, halvings + 1);
   }
 
-  // What a part may hold beyond what is known cannot be felt.
-  // An improvement below a share kLevel of the depth changes the force by as little.
+  // Whether nothing in a part is nearer than what is known by more than a share kLevel of the
+  // depth, which changes the force by as little.
   bool nothing_below(double bound2) const {
     const double distance = std::sqrt(least_), depth = std::max(0.0, radius_ - distance);
     return bound2 >= least_ - 2 * kLevel * distance * depth;
   }
 
-  // Downhill at every step, and never leaving the cell.
-  // Damped Newton: the step is halved until the distance does not grow and the point stays inside.
-  // Then plain Newton refines to round-off, and is taken if it found the same minimum.
+  // Damped Newton: the step is halved until the distance does not grow and the point stays inside
+  // the cell. Then plain Newton refines to round-off, and is taken if it found the same minimum.
   void descend(const Vec2& start) {
     double u = start.x(), v = start.y(), now = patch_.point(u, v).squaredNorm();
     for (int i = 0; i < 3 * kMostIterations; ++i) {

@@ -9,11 +9,10 @@
 
 namespace sphshell {
 
-// From a facet to a small number; keeps its memory.
-// A hash table that is emptied in constant time, as one is filled for each query.
+// From a facet to a small number: a hash table that keeps its memory and is emptied in constant
+// time, as it is filled anew for each query.
 class FacetTable {
  public:
-  // In constant time.
   // Slots of an earlier round count as empty, so nothing is written here; only where the counter
   // wraps around the table is emptied.
   void clear() {
@@ -21,8 +20,8 @@ class FacetTable {
     if (++round_ == 0) slots_.clear(), round_ = 1;
   }
 
-  // The number of a facet, a new one where it had none: then `added` is set.
-  // Grows by a factor of four before it would be more than a quarter full.
+  // The number of a facet, a new one where it had none: then `added` is set. The table grows by a
+  // factor of four before it would be more than a quarter full.
   int number(int facet, bool& added) {
     if (slots_.size() < 4 * (static_cast<std::size_t>(count_) + 1)) {
       std::vector<Slot> old(std::max<std::size_t>(1024, 4 * slots_.size()), Slot{0, 0, 0});
@@ -82,11 +81,10 @@ struct Way {
 class Components {
  public:
   // Leaves one minimum a cell, deepest first, and adds the saddles, of weight -1. The probe is a
-  // Sphere or a Plane. `ways`: all that connect the minima, where that is known.
-  // Four passes: one minimum a cell; the cells around each minimum, over the highest sides first;
-  // the spanning forest of these sides, of which those between two minima are saddles; what is
-  // left. Ties are broken by feature, element and facet, so that the result does not depend on the
-  // order in which the tree of boxes was walked.
+  // Sphere or a Plane. `ways`: all that connect the minima, where that is known. Else the cells
+  // around each minimum are found, over the highest sides first. In the spanning forest of these
+  // sides those between two minima are saddles. Ties are broken by feature, element and facet, so
+  // that the result does not depend on the order in which the tree of boxes was walked.
   template <class Probe>
   void merge(const Search<Probe>& search, const std::vector<Way>* ways) {
     const Probe& probe = search.probe;
@@ -135,10 +133,8 @@ class Components {
   }
 
  private:
-  // Where two cells meet: over a side, at its closest point, first only bounded from above; or at
-  // the closest point of both.
-  // Bound: depth is an upper bound from the chord. Side: exact. CommonPoint: of two minima at one
-  // place.
+  // Where two cells meet: over a side, where the depth is at first an upper bound from its chord
+  // (Bound), then that of its closest point (Side); or in one place that is closest on both.
   enum class Kind { Bound, Side, CommonPoint };
   struct SaddleCandidate {
     double depth;
@@ -182,7 +178,6 @@ class Components {
     return (Mat3() << east, n.cross(east), n).finished().transpose();
   }
 
-  // Whether a comes after b.
   // Order of the heap: shallower ones below; of equal ones that of the higher facet and side.
   static bool lower(const SaddleCandidate& a, const SaddleCandidate& b) {
     return a.depth != b.depth   ? a.depth < b.depth
@@ -195,8 +190,7 @@ class Components {
     std::push_heap(heap.begin(), heap.end(), lower);
   }
 
-  // Whether a facet is in a component, named by its first cell, already.
-  // By the number of the facet in cells_, if it has been reached.
+  // Whether a facet has been reached and is in a component, named by its first cell.
   bool belongs_to(int facet, int component) {
     const int cell = cells_.find(facet);
     return cell != FacetTable::kNone && root_of(parent_, cell) == component;
@@ -222,10 +216,10 @@ class Components {
     std::iota(deepest_.begin(), deepest_.begin() + minima, 0);
   }
 
-  // The ways out of a cell, onto the heap of its component.
-  // Pushes the ways out of a cell: to the other fans of a vertex where sheets meet in that point
-  // only, and over the sides. With the bulge, the most that a curved side is off its chord, the
-  // depth of the chord is an upper bound, cheap, and made exact in expand() if it comes up at all.
+  // Pushes the ways out of a cell onto the heap of its component: to the other fans of a vertex
+  // where sheets meet in that point only, and over the sides. The depth of a side's chord and the
+  // bulge, the most that the side is off it, make a cheap upper bound, which expand() makes exact
+  // if it comes up at all.
   template <class Probe>
   void add_candidates(const Search<Probe>& search, int f, int cell, int component) {
     const Shell& shell = search.shell;
@@ -282,10 +276,10 @@ class Components {
     });
   }
 
-  // Finds cells and the sides between them, as far as they decide on saddles.
-  // The highest candidate that leads out of a component belongs to some largest spanning forest
-  // (Prim). The smaller components go first, and all in turn: what remains when one component is
-  // left, or those that are left lead nowhere inside the sphere, is not looked at.
+  // Finds cells and the sides between them, as far as they decide on saddles: the highest candidate
+  // that leads out of a component belongs to some largest spanning forest (Prim). All components
+  // grow in turn to the same size: what remains when one component is left, or those that are left
+  // lead nowhere inside the sphere, is not looked at.
   template <class Probe>
   void grow_components(const Search<Probe>& search) {
     active_.resize(search.minima.size());
@@ -302,9 +296,8 @@ class Components {
     }
   }
 
-  // Takes one more candidate into account; returns the component then, -1 once it leads nowhere.
-  // Bounds are made exact where they come up first.
-  // `open` is sorted by depth: where its highest candidate is outside the sphere, all are.
+  // Takes the highest candidate of a component into account; returns the component then, or -1
+  // where that candidate, and so all of them, are outside the sphere.
   template <class Probe>
   int expand(const Search<Probe>& search, int component) {
     const auto& [shell, probe, want_dn_dc, minima] = search;
@@ -352,11 +345,10 @@ class Components {
     return kept;
   }
 
-  // The shallower of two minima ends at the saddle that merges their components (Kruskal).
-  // The sides of the forest join the cells in order of falling depth. Where two components with a
-  // minimum each are joined, the side's closest point is a saddle between these minima. Where it is
-  // hardly shallower than the shallower minimum, both are left out: the energy changes by the
-  // difference of their U alone.
+  // The sides of the forest merge the cells in order of falling depth (Kruskal). Where two
+  // components with a minimum each are merged, the side's closest point is a saddle, at which the
+  // shallower minimum ends. Where it is hardly shallower than that minimum, both are left out: the
+  // energy changes by the difference of their U alone.
   template <class Probe>
   void find_saddles(const Search<Probe>& search) {
     const Shell& shell = search.shell;

@@ -39,8 +39,6 @@ class FlatQuery {
   }
 
  private:
-  // The features whose normal cone holds the center; and those that a simpler one makes
-  // superfluous.
   // A face, an edge or a vertex holds a minimum where the center lies in its normal cone with
   // respect to every triangle that meets there: triangles are convex, so this is exact.
   void find_features(const Shell& shell, const Sphere& sphere, const std::vector<int>& candidates) {

@@ -79,9 +79,8 @@ void find_elements(const Shell& shell, const Sphere& sphere, BroadPhase& broad,
     return closest_on_triangle(center, shell.corners(t).data(), topology.face_normal[t]);
   };
   const int last = static_cast<int>(element.size()) - 1;
-  // The triangles of a quad are neighbors in the list.
+  // Of the two triangles of a quad, neighbors in the list, the nearer one counts.
   const auto is_nearest_of_element = [&](int t, double d2) {
-    // Of the two triangles of a quad the nearer one counts.
     for (int u : {t - 1, t + 1}) {
       if (u < 0 || u > last || element[u] != element[t]) continue;
       const double other2 = (center - closest(u).point).squaredNorm();

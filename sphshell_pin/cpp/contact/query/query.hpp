@@ -16,9 +16,9 @@ class Query {
   Query& operator=(const Query& other);
   ~Query();
 
-  // The contacts of the sphere (center in the shell's frame [m]); valid until the next call.
-  // Minima come deepest first, then saddles. With `rings` a contact all around an axis is the mean
-  // of the circle, else one of its points.
+  // The contacts of the sphere (center in the shell's frame [m]), minima first, the deepest in
+  // front, then saddles; valid until the next call. With `rings` a contact all around an axis is
+  // the mean of the circle, else one of its points.
   const std::vector<Contact>& find(const Shell& shell, const Vec3& center, double radius,
                                    Method method, bool rings = true);
 

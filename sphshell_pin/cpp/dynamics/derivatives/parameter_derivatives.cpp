@@ -137,7 +137,6 @@ void Linearization::contact_forces(const VectorX& q, const VectorX& v, ContactFo
     auto along = out.normal_force.row(row_of[i]);
     auto depth = out.depth.row(row_of[i]), plain = out.plain_depth.row(row_of[i]);
     // One column, from changes in the shell's frame.
-    // Product rule for force . normal.
     const auto add = [&](Eigen::Index column, const Vec3& force_by, const Vec3& normal_by,
                          double depth_by, double plain_by) {
       world.col(column) += side * (turn * force_by);

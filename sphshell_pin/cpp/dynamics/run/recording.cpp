@@ -164,7 +164,6 @@ void Recorder::add_peaks(const Stepping& made) {
     if (first.count == 0 && last.count == 0) continue;
     for (const auto& [of, most] : {std::pair(&TouchState::normal_force, &PairSummary::peak_force),
                                    std::pair(&TouchState::depth, &PairSummary::max_depth)}) {
-      // Towards its higher end a rate that has changed its sign falls.
       // A quantity that still grows backwards from its higher end has its peak within the step.
       const bool rises = last.*of > first.*of;
       const double higher = rises ? last.*of : first.*of;

@@ -312,9 +312,8 @@ void SceneData::compute_force(ActiveContact& active, const VectorX& z) {
                                             rate_of_turning(active, z.segment<3>(at + 3 * i));
 }
 
-// How fast a stretch turns with the normal, in the shell's frame.
-// The normal turns with the angular velocity n x n'; a vector that turns with it changes by (n x
-// n') x z.
+// How fast a stretch z turns with the normal, in the shell's frame: by the normal's angular
+// velocity n x n' it changes by (n x n') x z.
 Vec3 SceneData::rate_of_turning(const ActiveContact& active, const Vec3& stretch) const {
   const Pair& pair = pairs_[active.pair];
   if (!pair.has_dn_dc()) return Vec3::Zero();

@@ -109,8 +109,8 @@ void SceneData::log(const VectorX& q, const VectorX& v, std::vector<ContactRow>&
     const double side = pair.on_plane() ? -1 : 1;
     Vec3 push = Vec3::Zero(), friction = Vec3::Zero();
     double depth = 0;  // corrected, where the shape counts
-    // One without a place stands alone.
-    // Sums over the group: forces as vectors, corrected depths with their weights.
+    // Sums over the group, or of a contact by itself: forces as vectors, corrected depths with
+    // their weights.
     const std::size_t first = i - begin, last = whole.group < 0 ? first + 1 : contacts.size();
     for (std::size_t k = first; k < last; ++k) {
       if (k != first && contacts[k].group != whole.group) continue;

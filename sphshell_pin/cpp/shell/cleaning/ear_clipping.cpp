@@ -30,8 +30,8 @@ constexpr double kFlat = 2e-12;  // 2 area / longest edge^2 of a triangle withou
 constexpr double kTie = 1e-9;    // shapes nearer than this count as equal; place decides
 constexpr double kLast = 1e-6;   // factor on the shape of ears that would leave a sliver behind
 
-// The largest of n values that change one at a time, in O(log n).
-// A complete binary tree over the values, each node the larger of its children.
+// The largest of n values that change one at a time, in O(log n): a complete binary tree over the
+// values, each node the larger of its children.
 class Tournament {
  public:
   void reset(int n) {

@@ -140,8 +140,8 @@ void add_beyond(const Facet& facet, const CubicPatch& patch, int k, const Vec3& 
     out << level(patch.along_u(at.x(), at.y())), level(patch.along_v(at.x(), at.y()));
     return out;
   };
-  // The parameters of the vertex's projection; raising the center does not change them.
-  // The corner opposite a side, mirrored: where the neighbor's vertex is if it is a parallelogram.
+  // The parameters of the vertex's projection, which raising the center does not change, from those
+  // of the corner opposite a side, mirrored: where it is if both elements make a parallelogram.
   static constexpr double kU[3] = {1, -1, 1}, kV[3] = {-1, 1, 1};
   Eigen::Vector2d at(kU[k], kV[k]);
   for (int i = 0; i < 6; ++i) {
@@ -257,8 +257,8 @@ void CurvedShell::raise_centers(const Shell& shell) {
       if (c < 0) continue;
       add_beyond(facet, patch, k, shell.point(c), normals_[c], along, square);
     }
-    // Neighbors whose normals contradict it must not pull an element away from its own sides.
-    // The least-squares solution of all neighbors together, limited.
+    // The least-squares solution of all neighbors together, limited: those whose normals contradict
+    // it must not pull an element away from its own sides.
     const double most = facets_[f].largest_offset();
     if (square > 0) facets_[f].rise = std::clamp(along / square, -most, most);
   });

@@ -91,8 +91,7 @@ CellBounds bounds_of(const Facet& facet, const CubicPatch& patch, double bulge) 
   // The gradient of the height over the plane, in the middle.
   const Vec3 lean = n.dot(x) * axes.x + n.dot(y) * axes.y;
   const Vec3 offset = patch.point(kThird, kThird) - facet.middle();
-  // Rounded outward.
-  // To single precision, so that what is certain in double precision stays certain.
+  // Rounded outward to single precision, so that what is certain in double precision stays certain.
   const auto up = [](double value) { return static_cast<float>(value + 1e-6 * std::abs(value)); };
   CellBounds out{-up(-low),
                  up(high),

@@ -56,8 +56,7 @@ struct ContactForce {
   Vector3<S> slip = Vector3<S>::Zero();          // of the sphere against the shell [m/s]
 };
 
-// x, or the nearest to it in the ball.
-// The projection P of the friction laws.
+// The projection P of the friction laws: x, or the nearest to it in the ball.
 template <class S>
 Vector3<S> in_ball(const Vector3<S>& x, const S& radius) {
   using std::sqrt;
