@@ -41,20 +41,7 @@ struct Run {
   OneUser user{"run"};
   Simulation simulation;
 
-  Run(nb::handle model, std::vector<Pair> pairs, JointForces::Effects joints,
-      std::shared_ptr<Controller> controller, VectorX q0, VectorX v0, const RunSettings& settings,
-      std::vector<Sensor> sensors)
-      // In braces, as then what is checked is moved after its check.
-      : simulation{checked(model_of(model), q0, v0),
-                   {std::move(pairs), std::move(joints), settings, std::move(controller),
-                    std::move(q0), std::move(v0), std::move(sensors)}} {}
-
- private:
-  static const pinocchio::Model& checked(const pinocchio::Model& model, const VectorX& q0,
-                                         const VectorX& v0) {
-    check_state(model, q0, v0);
-    return model;
-  }
+  Run(const pinocchio::Model& model, Task task) : simulation(model, std::move(task)) {}
 };
 
 // What Python enters with `with`.
@@ -145,8 +132,7 @@ auto with_bristles(Answer answer) {
       check_count("z", z.size(), at.scene.bristle_size());
       check_count("tau", tau.size(), v.size());
       Linearization& linearization = at.state.linearization();
-      at.scene.restart();
-      at.scene.evaluate(q, v, z);
+      at.scene.evaluate_anew(q, v, z);
       return to_array(answer(at, linearization, z, tau));
     });
   };
@@ -298,10 +284,18 @@ void bind_dynamics(nb::module_& m) {
 
   // One run that goes on in pieces; each method is for one user at a time.
   nb::class_<Run> run(m, "Simulation", slots<Run>());
-  run.def(nb::init<nb::handle, std::vector<Pair>, JointForces::Effects, std::shared_ptr<Controller>,
-                   VectorX, VectorX, const RunSettings&, std::vector<Sensor>>(),
-          "model"_a, "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a,
-          "settings"_a, "sensors"_a)
+  run.def(
+         "__init__",
+         [](Run* self, nb::handle model, std::vector<Pair> pairs, JointForces::Effects joints,
+            std::shared_ptr<Controller> controller, VectorX q0, VectorX v0,
+            const RunSettings& settings, std::vector<Sensor> sensors) {
+           check_state(model_of(model), q0, v0);
+           new (self) Run(model_of(model),
+                          {std::move(pairs), std::move(joints), settings, std::move(controller),
+                           std::move(q0), std::move(v0), std::move(sensors)});
+         },
+         "model"_a, "pairs"_a, "joints"_a.none(), "controller"_a.none(), "q0"_a, "v0"_a,
+         "settings"_a, "sensors"_a)
       .def("differentiate",
            [](Run& self, std::vector<Parameter> parameters, bool by_q0, bool by_v0) {
              const SensitivitySettings settings{std::move(parameters), by_q0, by_v0};

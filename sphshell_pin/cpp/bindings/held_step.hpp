@@ -20,7 +20,6 @@ class HeldStep {
         start_{0, at.q, at.v, at.state.bristles(), {}} {
     // Explicit steps of this length hold bristles back.
     scene_.relax_in(stepper_->is_implicit() ? 0 : dt);
-    scene_.restart();
     chart_.begin(start_);
     scene_.evaluate(start_.q, start_.v, start_.z, true);
   }

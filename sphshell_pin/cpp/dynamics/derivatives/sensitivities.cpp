@@ -37,8 +37,7 @@ void Sensitivities::step(Stepping& made) {
   next_ = now_;
   made_ = &made, h_ = to.t - made.state().t;
   slopes_.carry(made.chart(), made.stepper(), h_, torque_, next_);
-  scene_.restart();
-  scene_.evaluate(to.q, to.v, to.z);
+  scene_.evaluate_anew(to.q, to.v, to.z);
 }
 
 void Sensitivities::accept(const State& to, bool located) {
@@ -146,8 +145,7 @@ void Sensitivities::add_row(const State& state, double share) {
   if (made_ && share < 1) {
     between_ = now_;
     slopes_.carry(made_->chart(), made_->stepper(), h_, torque_, between_, share);
-    scene_.restart();
-    scene_.evaluate(state.q, state.v, state.z, true);
+    scene_.evaluate_anew(state.q, state.v, state.z, true);
     at = &between_;
   }
   append(record_.q, at->topRows(state.v.size()));

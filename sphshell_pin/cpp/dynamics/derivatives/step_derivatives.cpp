@@ -47,8 +47,8 @@ MatrixX StepSlopes::finish(Chart& chart, const VectorX& y, const MatrixX& by) {
   return chart_slopes_.place(*origin_, by);
 }
 
-// At state_, which is evaluated.
-// v' by (u, v, z), with what the controller's torques add through the inverse inertia.
+// Evaluates the scene at state_: v' by (u, v, z), with what the controller's torques add through
+// the inverse inertia.
 void StepSlopes::linearize(Chart& chart, double t) {
   Torques& torques = chart.torques();
   follows_ = torques.follow_state();
@@ -142,7 +142,6 @@ MatrixX StepSlopes::own_rates() const {
 
 MatrixX StepSlopes::rates(Chart& chart, double t, const VectorX& y, const MatrixX& by) {
   chart.finish(t, y, state_);
-  scene_.evaluate(state_.q, state_.v, state_.z);
   linearize(chart, t);
   const MatrixX at = finish(chart, y, by);
   MatrixX out(by.rows(), by.cols());
@@ -225,9 +224,8 @@ bool StepSlopes::radau(const Path& path, double from, double to, MatrixX& change
                  t = chart.origin().t + at * path.h;
     path.stepper.interpolate(at, y_);
     chart.finish(t, y_, state_);
-    scene_.evaluate(state_.q, state_.v, state_.z);
-    touching = touching || scene_.touching() || scene_.joints().act();
     linearize(chart, t);
+    touching = touching || scene_.touching() || scene_.joints().act();
     slope[i].setZero(n, n);
     slope[i].block(0, nv, nv, nv).setIdentity();
     slope[i].bottomRows(nv + nz) = jacobian_;

@@ -84,8 +84,7 @@ void Recorder::add_rows(const Stepping& made) {
       moved = true;
     }
     if (moved) {
-      scene_.restart();
-      scene_.evaluate(to.q, to.v, to.z);
+      scene_.evaluate_anew(to.q, to.v, to.z);
     }
     if (to.t < (due() < last ? due() : end_)) return;
     ++next_row_;
@@ -181,8 +180,7 @@ void Recorder::add_peaks(const Stepping& made) {
     }
   }
   if (!moved) return;
-  scene_.restart();
-  scene_.evaluate(to.q, to.v, to.z);
+  scene_.evaluate_anew(to.q, to.v, to.z);
 }
 
 // Events and sums of an accepted step of length h that ends at t.

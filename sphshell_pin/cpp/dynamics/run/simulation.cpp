@@ -182,8 +182,12 @@ Simulation::Status Simulation::step() {
       made_cut_ = cut_;
       if (sensitivities_) sensitivities_->step(stepping_);
       accept();
-    } else
-      status = replace_fixed_step(end);
+    } else {
+      // One of the steps that replace a fixed one: there may be very many, and the caller wants to
+      // look at the clock.
+      stepping_.set_fine(true);
+      if (fine_steps_++ >= kMostFineSteps || !make_controlled(end)) status = Status::Stuck;
+    }
     if (status == Status::Running && time() < end) return is_finite() ? status : Status::Diverged;
     fine_steps_ = 0;
     // Back to fixed steps when they would do.
@@ -199,13 +203,6 @@ Simulation::Status Simulation::step() {
     }
   }
   return is_finite() ? status : Status::Diverged;
-}
-
-// One step of those that replace a fixed one: there may be very many, and the caller wants to look
-// at the clock.
-Simulation::Status Simulation::replace_fixed_step(double end) {
-  stepping_.set_fine(true);
-  return fine_steps_++ < kMostFineSteps && make_controlled(end) ? Status::Running : Status::Stuck;
 }
 
 // False where no step is short enough.
@@ -272,19 +269,15 @@ void Simulation::hold_torques() {
 }
 
 void Simulation::record_torques() {
-  recorder_.record_torques(
-      [this](const State& at) -> const VectorX& { return recorded_torques(at); }, tau_.size());
-}
-
-// The first row stands before the first torque that is held.
-const VectorX& Simulation::recorded_torques(const State& state) {
-  const bool held = settings_.control_dt > 0;
-  if (controller_ && !held) {
-    command(std::min(state.t, std::nextafter(kink_, -kInfinity)), state.q, state.v);
-  } else if (controller_ && controls_ == 0) {
-    tau_.setConstant(std::numeric_limits<double>::quiet_NaN());
-  }
-  return tau_;
+  const auto torques_at = [this](const State& at) -> const VectorX& {
+    const bool held = settings_.control_dt > 0;
+    if (controller_ && !held)
+      command(std::min(at.t, std::nextafter(kink_, -kInfinity)), at.q, at.v);
+    else if (controller_ && controls_ == 0)  // the first row stands before the first held torque
+      tau_.setConstant(std::numeric_limits<double>::quiet_NaN());
+    return tau_;
+  };
+  recorder_.record_torques(torques_at, tau_.size());
 }
 
 // What the controller asks for, cut to what the motors give.
@@ -339,8 +332,7 @@ void Simulation::change(std::vector<Pair> pairs, JointForces::Effects joints,
                         std::shared_ptr<Controller> controller) {
   if (!started_) start();
   State& state = stepping_.state();
-  scene_.restart();
-  scene_.evaluate(state.q, state.v, state.z, true);
+  scene_.evaluate_anew(state.q, state.v, state.z, true);
   // At the same state, with the laws before and after the change.
   const double before = scene_.powers().elastic;
   scene_.change(std::move(pairs), std::move(joints));

@@ -144,11 +144,9 @@ class Simulation : private Torques {
   // long), derivatives, acceptance, and the torques that are held from then on.
   void begin_sensors();
   Status step();
-  Status replace_fixed_step(double end);
   bool make_controlled(double end);
   void accept();
   void hold_torques();
-  const VectorX& recorded_torques(const State& state);
   void command(double t, const VectorX& q, const VectorX& v);
   double end_of_step() const;
   bool is_finite() const;

@@ -131,8 +131,7 @@ void Stepping::resume(const double* from) {
   state_.ledger = {from[1], from[2], from[3]};
   state_.q = Eigen::Map<const VectorX>(from + kSaved, state_.q.size());
   state_.v = Eigen::Map<const VectorX>(from + kSaved + state_.q.size(), state_.v.size());
-  scene_.restart();
-  scene_.evaluate(state_.q, state_.v, state_.z, true);
+  scene_.evaluate_anew(state_.q, state_.v, state_.z, true);
   set_fine(from[7] != 0);
   begin();
   proposal_ = from[4], last_error_ = from[5];
@@ -158,8 +157,7 @@ bool Stepping::make_fixed(double end) {
   active_->complete(chart_, next_);
   scene_.evaluate(next_.q, next_.v, next_.z);
   if (detection_.allowed(scene_, state_, next_) >= 1 && !passes_kinks()) return true;
-  scene_.restart();
-  scene_.evaluate(state_.q, state_.v, state_.z);
+  scene_.evaluate_anew(state_.q, state_.v, state_.z);
   proposal_ = std::min(proposal_, 0.1 * (end - state_.t));
   after_event_ = false;
   last_error_ = 1;
@@ -224,8 +222,7 @@ Stepping::Made Stepping::make_controlled(double end) {
           continue;
         }
         // The search has looked elsewhere; the step ends here.
-        scene_.restart();
-        scene_.evaluate(next_.q, next_.v, next_.z);
+        scene_.evaluate_anew(next_.q, next_.v, next_.z);
       }
       if (is_met) limit = kink_limit;
     }
@@ -289,8 +286,7 @@ double Stepping::predicted_step(double h) {
   for (int i = 0; i < kMostEventSteps; ++i) {
     path(1, probe_);
     chart_.finish(state_.t + h, probe_, next_);
-    scene_.restart();
-    scene_.evaluate(next_.q, next_.v, next_.z);
+    scene_.evaluate_anew(next_.q, next_.v, next_.z);
     const double allowed = detection_.allowed(scene_, state_, next_, true);
     if (allowed >= 1) break;
     h *= std::clamp(0.95 * allowed, 0.01, 0.9);

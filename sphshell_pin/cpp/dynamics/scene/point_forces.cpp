@@ -88,14 +88,19 @@ void PointForces::complete(const SceneData& scene, ActiveContact& active) const 
   f = whole;
 }
 
+// The ellipse in which two bodies touch, by Hertz's geometry (Johnson, Contact Mechanics, 4.2).
 PatchRow PointForces::patch(SceneData& scene, const ActiveContact& active,
                             const ContactRow& row) const {
   const Pair& pair = scene.pair_of(active);
   if (!pair.has_sphere()) return unknown_patch(row.depth);
   const ContactShape gap =
       active.shape < 0 ? scene.shape_of(active.pair, pair, active.contact) : *scene.shape(active);
-  return hertz_patch(gap, scene.state_of(active).world_from_j.rotation(), row.depth,
-                     row.normal_force);
+  const Eigen::Vector2d half = gap.half_axes(row.depth);
+  const Vec3 axis = scene.state_of(active).world_from_j.rotation() * gap.axis;
+  const double mean = row.normal_force / (M_PI * half[0] * half[1]);
+  PatchRow out{{half[0], half[1]}, {}, 1.5 * mean, mean, row.depth};
+  std::copy_n(axis.data(), 3, out.axis);
+  return out;
 }
 
 void PointForces::slopes(const SceneData& scene, const ActiveContact& active,

@@ -71,7 +71,12 @@ class SceneData {
   // the shells' frames), then those of joints. With `identify` contacts get their ids even where no
   // force depends on them.
   void evaluate(const VectorX& q, const VectorX& v, const VectorX& z, bool identify = false);
-  // The same with another velocity, at the placements of the last evaluate().
+  // The same from the accepted state on.
+  void evaluate_anew(const VectorX& q, const VectorX& v, const VectorX& z, bool identify = false) {
+    restart();
+    evaluate(q, v, z, identify);
+  }
+  // The same as evaluate() with another velocity, at the placements of the last one.
   void revisit(const VectorX& q, const VectorX& v, const VectorX& z);
   // Makes the state of the last evaluate() the one from which contacts and bristles go on. Slots
   // are assigned anew: z is put in their order.

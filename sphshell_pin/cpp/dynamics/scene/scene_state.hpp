@@ -17,10 +17,7 @@ class SceneState {
   SceneState& operator=(const SceneState&) = delete;
 
   // Forces at (q, v), with the memory as it is: they do not change it.
-  void evaluate(const VectorX& q, const VectorX& v) {
-    scene_.restart();
-    scene_.evaluate(q, v, z_, true);
-  }
+  void evaluate(const VectorX& q, const VectorX& v) { scene_.evaluate_anew(q, v, z_, true); }
 
   // The motion has come to (q, v), in dt [s]. Bristles are stretched as SemiImplicitEuler does it:
   // with the new velocity, at the contacts where the step began. The first call only begins.

@@ -5,7 +5,6 @@
 namespace sphshell {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 // Pieces of a filter's period. A sine at the cutoff is then followed to 1e-4 of its amplitude.
 constexpr double kPieces = 8;
 
@@ -245,8 +244,7 @@ void Sensors::add_dense(const Stepping& made) {
       measure(state);
       out = measured_;
     });
-    scene_.restart();
-    scene_.evaluate(to.q, to.v, to.z);
+    scene_.evaluate_anew(to.q, to.v, to.z);
   }
   known_ = filtered_;
   deliver(to.t);
@@ -282,7 +280,7 @@ void Sensors::filter(double h) {
       continue;
     }
     // The exact solution of the low-pass filter for a parabola through start, middle and end.
-    const Weights w = weights(2 * kPi * cutoff * h);
+    const Weights w = weights(2 * M_PI * cutoff * h);
     for (std::size_t i = begin; i < end; ++i) {
       const double s0 = before_[i], b = 4 * middle_[i] - 3 * s0 - after_[i];
       const double c = 2 * (s0 + after_[i] - 2 * middle_[i]);
