@@ -307,6 +307,8 @@ def add_origin(error: Exception, what: str) -> None:
 
 def _shown(value: object) -> str:
     """Return `value` on one line, cut in the middle where it is long."""
+    if getattr(value, "size", _LONGEST_VALUE) < _LONGEST_VALUE:
+        value = getattr(value, "tolist", lambda: value)()  # of NumPy: its numbers alone
     text = " ".join(repr(value).split())
     half = _LONGEST_VALUE // 2
     return text if len(text) <= _LONGEST_VALUE else f"{text[:half]} ... {text[-half:]}"

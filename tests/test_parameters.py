@@ -4,6 +4,7 @@ import re
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
@@ -69,6 +70,18 @@ def test_a_value_is_checked_against_its_description(values, said):
     with pytest.raises(InvalidParameter, match=said) as caught:
         Spring(**{"stiffness": 1.0, **values})
     assert caught.value.name == next(iter(values))
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [
+        (np.float64(-0.5), "-0.5"),
+        (np.zeros(3), "[0.0, 0.0, 0.0]"),
+        ("s" * 300, f"'{'s' * 99} ... "),
+    ],
+)
+def test_a_refused_value_is_shown_as_it_would_be_typed(value, shown):
+    assert str(InvalidParameter("speed", value, "must be")).startswith(f"speed = {shown}")
 
 
 def test_units_may_depend_on_other_values():

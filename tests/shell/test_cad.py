@@ -12,6 +12,8 @@ from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge
 from OCP.gp import gp_Pnt
 
 from sphshell_pin import Shell, errors
+from sphshell_pin.shell.cad.model import compound, faces_of
+from tests.parts import occ
 from tests.parts.occ import area_and_volume
 from tests.programs import python
 from tests.shell import cad_shapes as shapes
@@ -156,6 +158,16 @@ def test_a_face_that_lost_its_surface_is_told_and_the_others_stay(solids, entity
         path.write_text(surface.sub(lambda number: "0" * len(number[0]), text))
         with pytest.raises(errors.ShellFileError, match=f"{faces} of the {faces} faces"):
             Shell.from_file(path)
+
+
+@pytest.mark.parametrize("size", [1.0, 100.0])
+def test_faces_are_joined_over_gaps_of_a_share_of_their_size(size, tmp_path):
+    """Two halves of a plate [mm], 4.5e-5 of its diagonal apart."""
+    half = faces_of(shapes.box(size, size, size))[0]
+    apart = compound([half, occ.moved(half, (0.0, (1 + 1e-4) * size, 0.0))])
+    path = shapes.write_brep(tmp_path / "halves.brep", apart)
+    for sew, edges in ((None, 6), (0.0, 8)):
+        assert Shell.from_file(path, unit="mm", sew=sew).health.boundary_edges == edges
 
 
 WRITERS = {
