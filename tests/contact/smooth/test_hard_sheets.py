@@ -27,6 +27,28 @@ def with_another(mesh: meshes.Mesh, vertices: np.ndarray) -> Shell:
     return Shell(np.concatenate([mesh[0], vertices]), elements)
 
 
+@pytest.mark.parametrize("method", ["smooth", "facets"])
+@pytest.mark.parametrize("angles", [(60, 90, 120), (30, 60, 150, 120)])
+def test_sheets_that_share_an_edge_touch_there_once(angles, method: str) -> None:
+    """Three sheets or four, which all go away from the sphere, on one edge of several pieces."""
+    rows, turn = np.linspace(-1.0, 1.0, 4), meshes.random_rotation(3)
+    ends = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
+    vertices = np.array([(x, y, z) for y, z in [(0.0, 0.0), *ends] for x in rows])
+    elements = [
+        corners
+        for sheet in range(4, 4 * len(ends) + 1, 4)
+        for k in range(3)
+        for corners in ((k, k + 1, sheet + k + 1), (k, sheet + k + 1, sheet + k))
+    ]
+    shell = Shell(vertices @ turn.T, elements)
+    for x in np.linspace(-0.9, 0.9, 13):
+        for y in (-0.05, 0.0, 0.08):
+            center = np.array([x, y, -np.sqrt(0.19**2 - y**2)])
+            found = shell.contacts(turn @ center, 0.2, method=method)
+            assert found.depth == pytest.approx([0.01], abs=1e-12)
+            assert found.point[0] @ turn == pytest.approx([x, 0.0, 0.0], abs=1e-12)
+
+
 def test_parallel_sheets() -> None:
     """Two sheets closer than 2 r; two contacts that push against each other, exact."""
     plate = meshes.random_plate(200, size=6.0, slivers=False)
