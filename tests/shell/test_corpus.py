@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -70,3 +71,35 @@ def test_what_is_known_of_each_file_is_found(name):
     again = Shell(shell.vertices, shell.elements, side=shell.side).health
     expect(again, elements=health.elements, boundary_edges=health.boundary_edges)
     assert not again.repairs
+
+
+RECOGNIZED = {
+    "trimesh_featuretype.STL": ({"plane": 53, "cylinder": 31}, 3326),
+    "trimesh_wallhole.obj": ({"plane": 13}, 66),
+    "manifold_openscad-nonmanifold-crash.obj": ({"plane": 66}, 574),
+    "trimesh_quadknot.obj": ({}, 0),
+    "c3d_fandisk.obj": ({"plane": 9}, 4275),
+}
+
+
+@pytest.mark.parametrize("name", RECOGNIZED)
+def test_faces_are_recognized_as_before(name):
+    shell = load(name)
+    kinds = dict(Counter(face.kind for face in shell.faces))
+    assert (kinds, sum(len(face.elements) for face in shell.faces)) == RECOGNIZED[name]
+
+
+def test_curved_elements_of_a_part_are_as_near_as_before():
+    """Mean distance from the faces of the CAD file, against that of the flat elements."""
+    exact = Shell.from_file(surface_file("trimesh_featuretype.STEP"))
+    shell = Shell.from_file(surface_file("trimesh_featuretype.STL"), unit="in")
+    rng = np.random.default_rng(0)
+    corners = exact.vertices[exact.triangles[rng.integers(len(exact.triangles), size=20_000)]]
+    places = np.einsum("nkx,nk->nx", corners, rng.dirichlet([1, 1, 1], 20_000))
+    places = exact.closest_points(places).points
+    curved, flat = (
+        np.abs(shell.closest_points(places, method=method).distances)
+        for method in ("smooth", "facets")
+    )
+    assert curved.mean() < 0.036 * flat.mean()
+    assert curved.max() <= flat.max()

@@ -139,6 +139,17 @@ def test_order_and_error_of_a_power_law():
     assert convergence.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
 
 
+def test_findings_on_forces_are_those_of_the_worst_surface():
+    rows = force_rows()
+    found = {one.key: one.value for one in convergence.assemble(rows).findings}
+    lines = [convergence.of(rows, name, convergence.SMOOTH) for name in convergence.CURVED]
+    assert found["force_error"] == max(map(convergence.error_at, lines))
+    assert found["force_error_largest"] == max(
+        convergence.error_at(line, "largest") for line in lines
+    )
+    assert found["force_order"] == min(map(convergence.order, lines))
+
+
 def broken(*, quick, progress):
     raise ValueError("a <b> broke")
 
