@@ -141,6 +141,19 @@ def test_a_change_of_stiffness_is_booked_and_gives_the_new_rest(integrator) -> N
     assert abs(run.residual) < 1e-3 * G * (G / 1e4)
 
 
+def test_a_target_goes_on_from_its_place_at_every_change_of_speed() -> None:
+    def controller(speed: float) -> sp.CartesianImpedance:
+        way = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+        return sp.CartesianImpedance("ball", way, 1e4, 200.0, speed=speed)
+
+    scene, speeds = sp.Scene(models.block()), (0.1, 0.05, 0.2, 0.1)
+    run = opened(scene, sp.Adaptive(1e-9), [0.0, 0.0, 0.0], None, controller=controller(speeds[0]))
+    for speed, place in zip(speeds, np.cumsum(speeds), strict=True):
+        assert run.change(scene, controller(speed))
+        run.advance(1.0)
+        assert run.snapshot().q[0, 0] == pytest.approx(place, abs=1e-6)
+
+
 def test_a_stretched_bristle_outlives_a_change() -> None:
     """A block on a slope hangs on its bristle; another normal law must not let it slip."""
     tilt, friction = 0.3, sp.BristleFriction(0.8, 0.8, 1e5, 300.0)
