@@ -87,6 +87,13 @@ def test_derivatives_are_those_of_finite_differences(name: str, friction, ground
         testing.assert_wrenches_cancel(scene, q, v)
 
 
+@pytest.mark.parametrize("name", ["box", "coin"])
+def test_derivatives_where_places_slide_in_different_directions(name: str) -> None:
+    """Round the normal: what friction adds at each does not cancel in their sum."""
+    scene, q, v = lying(name, LAW, FRICTIONS[1])
+    assert_derivatives(scene, q, v + np.array([0.03, 0.0, 0.0, 0.0, 0.0, 3.0]))
+
+
 @pytest.mark.parametrize("name", SHELLS)
 def test_the_force_is_the_gradient_of_a_potential(name: str) -> None:
     """Round closed ways through states that lie flat, on edges and on corners."""

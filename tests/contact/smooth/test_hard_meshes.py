@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from sphshell_pin import Shell
 from sphshell_pin.shell.curvature import curved_mesh
@@ -21,6 +22,25 @@ def test_needle() -> None:
     rng = np.random.default_rng(0)
     for x, y in rng.uniform(-0.7, 0.7, (300, 2)) * rng.choice([1.0, 1e-5], (300, 1)):
         assert push(shell, [x, y, 0.1 * (1 - DEPTH)], 0.1) == pytest.approx(UP, abs=1e-12)
+
+
+@pytest.mark.parametrize("bulge", [-0.3, 0.3])
+def test_closest_points_of_tall_elements_that_bend(bulge: float) -> None:
+    """A waist or a barrel of three rows: no point of its elements is nearer than what is found."""
+    rows, columns = np.linspace(-1.5, 1.5, 4), 2 * np.pi * np.arange(100) / 100
+    z, turn = (one.ravel() for one in np.meshgrid(rows, columns, indexing="ij"))
+    out = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
+    normals = out + bulge * np.sin(z)[:, None] * UP
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    a = (100 * np.arange(3)[:, None] + np.arange(100)).ravel()
+    b = a - a % 100 + (a + 1) % 100
+    triangles = np.concatenate([np.stack([a, b, b + 100], 1), np.stack([a, b + 100, a + 100], 1)])
+    vertices = (1 + bulge * np.cos(z))[:, None] * out + z[:, None] * UP
+    shell = Shell(vertices, triangles, normals[triangles])
+    centers = np.random.default_rng(0).uniform(-2, 2, (1000, 3))
+    found = np.abs(shell.closest_points(centers).distances)
+    nearest, _ = cKDTree(curved_mesh(shell, 20)[0]).query(centers)
+    assert (found - nearest).max() < 1e-9
 
 
 def test_folded_needles() -> None:
