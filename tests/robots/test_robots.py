@@ -53,6 +53,15 @@ def test_without_the_library_own_robots_still_load(monkeypatch):
         robots.load("panda")
 
 
+@pytest.mark.parametrize("name", ["ur3", "ur5_gripper", "ur10_limited"])
+def test_the_posture_in_which_an_arm_works_has_the_flange_down(name):
+    robot = robots.load(name)
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, np.array(robots.WORKING[name]))
+    flange = data.oMf[robot.model.getFrameId("tool0")].rotation
+    np.testing.assert_allclose(flange[:, 2], [0.0, 0.0, -1.0], atol=1e-4)
+
+
 @pytest.mark.parametrize("name", ["so100", "a1", "panda", "ball"])
 def test_the_base_of_a_shipped_robot_is_what_it_is_asked_to_be(name):
     plain, fixed, free = (robots.load(name, free_flyer=one) for one in (None, False, True))

@@ -139,6 +139,15 @@ def test_order_and_error_of_a_power_law():
     assert convergence.error_at(line, "largest") == pytest.approx(3 * 0.3**4)
 
 
+def test_measuring_queries_says_how_far_it_is():
+    heard = []
+    times = query_section.measure((4, 8), 1, heard.append)
+    assert {triangles for _, triangles in times} == {32, 128}
+    assert heard[:2] == [0.25, 0.5]
+    assert heard == sorted(heard)
+    assert heard[-1] == 1.0
+
+
 def test_findings_on_forces_are_those_of_the_worst_surface():
     rows = force_rows()
     found = {one.key: one.value for one in convergence.assemble(rows).findings}
