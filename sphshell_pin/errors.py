@@ -10,7 +10,7 @@ from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from sphshell_pin.dynamics.result.result import Result
@@ -305,10 +305,10 @@ def add_origin(error: Exception, what: str) -> None:
     error.add_note(f"raised by {what}{where}")
 
 
-def _shown(value: object) -> str:
-    """Return `value` on one line, cut in the middle where it is long."""
-    if getattr(value, "size", _LONGEST_VALUE) < _LONGEST_VALUE:
-        value = getattr(value, "tolist", lambda: value)()  # of NumPy: its numbers alone
+def _shown(value: Any) -> str:
+    """Return `value` on one line, cut in the middle where it is long; of NumPy's the numbers."""
+    if type(value).__module__ == "numpy" and value.size < _LONGEST_VALUE:
+        value = value.tolist()
     text = " ".join(repr(value).split())
     half = _LONGEST_VALUE // 2
     return text if len(text) <= _LONGEST_VALUE else f"{text[:half]} ... {text[-half:]}"

@@ -3,6 +3,7 @@
 import re
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -77,6 +78,8 @@ def test_a_value_is_checked_against_its_description(values, said):
     [
         (np.float64(-0.5), "-0.5"),
         (np.zeros(3), "[0.0, 0.0, 0.0]"),
+        (np.zeros(1000), "array([0., 0., 0., "),
+        (SimpleNamespace(size=len), "namespace(size=<built-in function len>)"),
         ("s" * 300, f"'{'s' * 99} ... "),
     ],
 )

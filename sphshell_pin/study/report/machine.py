@@ -11,8 +11,9 @@ from pathlib import Path
 BUSY = 0.5
 """Load before the measurements from which on a report says that the machine was busy."""
 
-# Distributions whose speed shows on the page, in its order; others are left out.
-PACKAGES = "sphshell-pin pin coal numpy trimesh libigl fcpw mujoco drake pybullet"
+# Distributions whose speed shows on a page, in its order; others are left out.
+OWN = "sphshell-pin", "pin", "coal", "numpy"
+PEERS = "trimesh", "libigl", "fcpw", "mujoco", "drake", "pybullet"
 
 
 def caution_of(load: float) -> str:
@@ -34,7 +35,7 @@ def describe(command: str) -> dict[str, str]:
         if model := re.search(r"^model name\s*:\s*(.+)", text, re.MULTILINE):
             processor = model[1]
     versions = []
-    for name in PACKAGES.split():
+    for name in (*OWN, *PEERS):
         with contextlib.suppress(metadata.PackageNotFoundError):
             versions.append(f"{name} {metadata.version(name)}")
     found = {
