@@ -22,7 +22,7 @@ VARY = {"contact.law.stiffness": "1e4:1e6:log:30", "contact.law.exponent": [1.5,
 
 
 class Cluster:
-    """A scheduler and workers of one thread each, as the command dask starts them."""
+    """A scheduler and workers, as the command dask starts them."""
 
     def __init__(self, folder):
         self.folder, self.file = folder, folder / "scheduler.json"
@@ -42,9 +42,10 @@ class Cluster:
                 subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
             )
 
-    def start_worker(self):
-        options = "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1", "--no-nanny"
-        self.start("worker", *options)
+    def start_worker(self, *options, threads=1):
+        self.start(
+            "worker", "--nthreads", str(threads), "--no-dashboard", "--host", "127.0.0.1", *options
+        )
 
     def close(self):
         for process in reversed(self.processes):
@@ -61,7 +62,7 @@ def cluster(tmp_path):
 def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, cluster):
     path = write(tmp_path / "scenario")
     for _ in range(2):
-        cluster.start_worker()
+        cluster.start_worker("--no-nanny")
     serial, table = tmp_path / "serial.parquet", tmp_path / "cluster.parquet"
     sweep(path, VARY, workers=0, out=serial)
 
@@ -74,9 +75,18 @@ def test_a_killed_worker_of_a_cluster_costs_nothing(tmp_path, cluster):
     assert table.read_bytes() == serial.read_bytes()
 
 
+def test_runs_that_a_deadly_one_takes_with_it_are_done_all_the_same(tmp_path, cluster):
+    """All four are on the one worker when it dies, each of the times that Dask tries."""
+    cluster.start_worker(threads=4)
+    vary = {"contact.law.stiffness": [1e4, 2e4, 3e4, 4e4]}
+    table = sweep(write(tmp_path / "scenario", "deadly"), vary, scheduler=cluster.address)
+    assert table["status"].tolist() == ["done", "failed", "done", "done"]
+    assert table["error"][1] == "its worker process died each time it was tried"
+
+
 def test_a_scheduler_that_dies_is_told_and_what_was_done_is_kept(tmp_path, cluster):
     path, table = write(tmp_path / "scenario"), tmp_path / "table.parquet"
-    cluster.start_worker()
+    cluster.start_worker("--no-nanny")
 
     def progress(done, failed, total):
         if done == 10:

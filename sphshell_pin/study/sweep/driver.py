@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
 from functools import partial
@@ -225,7 +226,8 @@ def _outcomes(
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Yield number and outcome of each run, as they come; closing ends what is under way.
 
-    Dask starts a worker that died anew, and gives its run to another one.
+    Dask starts a worker that died anew and tries all runs that were on it again, a few times. Of
+    those that are then given up, any one may have killed the others: each is done again, alone.
 
     Raises
     ------
@@ -244,22 +246,28 @@ def _outcomes(
         sys.modules["__main__"] = ModuleType("__main__")
         client = stack.enter_context(contextlib.closing(_client(workers, len(runs), scheduler)))
         submit = partial(client.submit, worker.run_one, plan.job, pure=False)
-        numbers = {submit(run): i for i, run in runs.items()}
-        for future in distributed.as_completed(list(numbers), loop=client.loop):
-            number = numbers.pop(future)
-            try:
-                yield number, future.result()
-            except distributed.KilledWorker:
-                yield number, Outcome("its worker process died each time it was tried")
-            except SweepError:
-                raise
-            except (CancelledError, OSError):
-                raise SweepError(f"{where} went away") from None
-            except Exception as fault:
-                raise SweepError(
-                    f"the workers of {where} cannot do the runs, is the same sphshell-pin "
-                    f"installed there? ({type(fault).__name__}: {' '.join(str(fault).split())})"
-                ) from None
+        groups = deque([list(runs)])
+        while groups:
+            group = groups.popleft()
+            numbers = {submit(runs[i]): i for i in group}
+            for future in distributed.as_completed(list(numbers), loop=client.loop):
+                number = numbers.pop(future)
+                try:
+                    yield number, future.result()
+                except distributed.KilledWorker:
+                    if len(group) > 1:
+                        groups.append([number])
+                    else:
+                        yield number, Outcome("its worker process died each time it was tried")
+                except SweepError:
+                    raise
+                except (CancelledError, OSError):
+                    raise SweepError(f"{where} went away") from None
+                except Exception as fault:
+                    raise SweepError(
+                        f"the workers of {where} cannot do the runs, is the same sphshell-pin "
+                        f"installed there? ({type(fault).__name__}: {' '.join(str(fault).split())})"
+                    ) from None
 
 
 def _client(workers: int | None, runs: int, scheduler: str | None) -> Any:
