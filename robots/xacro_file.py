@@ -23,8 +23,8 @@ from sphshell_pin.robots.packages import Folders, workspaces
 TIME_LIMIT = 5.0
 """Time of the processor, to expand a file [s]; large robots take one or two."""
 
-WAIT = 60.0
-"""How long the process is waited for [s], on a busy machine too."""
+WAIT = 300.0
+"""How long the process is waited for [s]: on a busy machine it gets little of the processor."""
 
 CHILD = "sphshell_pin.robots.xacro_child"
 """The module whose `serve` runs in the process."""
@@ -149,7 +149,10 @@ def _expanded(file: Path, folders: Folders, arguments: Mapping[str, object]) -> 
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise ValueError(long) from None
+        raise ValueError(
+            f"xacro has not expanded it after {WAIT:g} s: the machine is busy, or a file that it "
+            "includes cannot be read to its end"
+        ) from None
     if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
         raise ValueError(long)
     try:
