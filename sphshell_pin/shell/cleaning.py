@@ -129,7 +129,7 @@ def _given(raw: RawSurface) -> orientation.Found:
     """Begin the record of the cleaning: ShellHealth's fields by name, 0 unless they are set."""
     found: orientation.Found = defaultdict(int)
     found["input_vertices"], found["input_elements"] = len(raw.vertices), raw.num_polygons
-    found["notes"] = raw.notes
+    found["notes"], found["missing_faces"] = raw.notes, raw.missing_faces
     return found
 
 

@@ -44,6 +44,8 @@ _REPAIRS = (
 """Sentences, each for a surface whose field that it names first is not zero."""
 
 _PROBLEMS = (
+    "{missing_faces:face} of the file missing, which could not be read or be given triangles: "
+    "export the part again, or mend the face in the CAD system",
     "{holes:hole} in the surface, the largest of {hole_edges} open edges and "
     "{largest_hole_area:.3g} m^2 near {hole_at:place}: unless it is meant, an element is "
     "missing or has a wrong number of corners",
@@ -191,6 +193,7 @@ class ShellHealth:
         taken in, the factor from the numbers of the file to meters
     cleaned : False if the surface was taken as it came (`clean=False`)
     input_vertices, input_elements : as given
+    missing_faces : of the CAD file, which could not be read or be given triangles
     vertices, elements, triangles, quads : what is left; a planar quad is one element
     size, area, volume : box diagonal; surface [m^2]; enclosed by the closed components [m^3]
     weld_tolerance, welded_vertices, weld_distance : merged within; how many; the farthest
@@ -230,6 +233,7 @@ class ShellHealth:
     cleaned: bool = True
     input_vertices: int = 0
     input_elements: int = 0
+    missing_faces: int = 0
     vertices: int = 0
     elements: int = 0
     triangles: int = 0

@@ -126,6 +126,7 @@ class RawSurface:
     rounding : half the step to which the coordinates are known [m], 0 if they show none
     solids : (m,) solid of the CAD file whose surface each polygon is part of, -1 of none; or None.
         No vertex is used by polygons of two
+    missing_faces : how many faces of the CAD file could not be read, or be given triangles
     """
 
     vertices: Array
@@ -138,6 +139,7 @@ class RawSurface:
     face_shapes: Array | None = None
     rounding: float = 0.0
     solids: Ints | None = None
+    missing_faces: int = 0
 
     @property
     def num_polygons(self) -> int:

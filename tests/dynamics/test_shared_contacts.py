@@ -56,6 +56,7 @@ SHELLS = {
     "box on an edge": (box, pin.utils.rotate("x", 0.6)),
     "wedge": (lambda: prism(TRIANGLE, 0.02), np.eye(3)),
     "coin": (lambda: solid(COIN), np.eye(3)),
+    "coin on its other side": (lambda: solid(COIN), pin.utils.rotate("x", np.pi)),
     "roller": (lambda: solid(ROLLER), pin.utils.rotate("x", np.pi / 2)),
     "cone": (lambda: solid(CONE), pin.utils.rotate("y", SLANT)),
     "sheet": (lambda: sp.Shell(*grid_plate(2, 2, 0.05)), np.eye(3)),

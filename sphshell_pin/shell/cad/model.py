@@ -179,6 +179,7 @@ class CadModel:
     faces : in the order of the file
     bodies : name and shape of each body, a solid if the file has one
     unit : what the header says about the unit of length, and in what `shape` came
+    missing : how many faces of the file could not be read
     notes : sentences about the reading
     """
 
@@ -186,6 +187,7 @@ class CadModel:
     faces: tuple[CadFace, ...]
     bodies: tuple[Part, ...]
     unit: HeaderUnit
+    missing: int = 0
     notes: tuple[str, ...] = ()
 
     @property

@@ -60,8 +60,9 @@ def read_model(path: Path) -> cad_model.CadModel:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ShellFileError(path, f"is damaged, it cannot be read as {kind} ({reason})") from error
     if not model.faces:
+        lost = f"none of its {model.missing} faces can be read: export the part again"
         none = "holds no surface, only curves or points at most: export faces or solids"
-        raise ShellFileError(path, "; ".join(model.notes) or none)
+        raise ShellFileError(path, lost if model.missing else none)
     return model
 
 
@@ -92,8 +93,8 @@ def _read_step(path: Path, data: bytes) -> cad_model.CadModel:
         for found in (_STEP_BODY.findall(data), _STEP_FACE.findall(data))
     )
     faces, bodies = _sort(parts, *namers)
-    notes = _lost(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
-    return cad_model.CadModel(path, faces, bodies, unit, notes)
+    missing = _missing(len(re.findall(rb"=\s*(?:ADVANCED_|)FACE(?:_SURFACE|)\s*\(", data)), faces)
+    return cad_model.CadModel(path, faces, bodies, unit, missing)
 
 
 def _walk(label: Occ, location: Occ, parts: list[cad_model.Part]) -> None:
@@ -140,8 +141,8 @@ def _read_iges(path: Path, data: bytes) -> cad_model.CadModel:
     named = any(model.Entity(k).HasName() for k in entities)
     faces, bodies = _sort(parts, *2 * [name_of if named else _no_name])
     held = (model.Entity(k).TypeNumber() for k in entities)
-    notes = _lost(sum(kind in IGES_FACES for kind in held), faces)
-    return cad_model.CadModel(path, faces, bodies, unit, notes)
+    missing = _missing(sum(kind in IGES_FACES for kind in held), faces)
+    return cad_model.CadModel(path, faces, bodies, unit, missing)
 
 
 def _read_brep(path: Path, data: bytes) -> cad_model.CadModel:
@@ -149,8 +150,8 @@ def _read_brep(path: Path, data: bytes) -> cad_model.CadModel:
     if not BRepTools.Read_s(shape, str(path), BRep_Builder()) or shape.IsNull():
         raise ShellFileError(path, "is damaged, its BREP shape cannot be read")
     faces, bodies = _sort([("", shape)], _no_name, _no_name)
-    notes = _lost(sum(1 for _ in cad_model.subshapes(shape, TopAbs_FACE)), faces)
-    return cad_model.CadModel(path, faces, bodies, cad_model.NO_UNIT, notes)
+    missing = _missing(sum(1 for _ in cad_model.subshapes(shape, TopAbs_FACE)), faces)
+    return cad_model.CadModel(path, faces, bodies, cad_model.NO_UNIT, missing)
 
 
 def _no_name(_: Occ) -> str:
@@ -163,12 +164,9 @@ def _name(text: str) -> str:
     return "" if _NO_NAME.fullmatch(text) else text
 
 
-def _lost(held: int, faces: tuple[cad_model.CadFace, ...]) -> tuple[str, ...]:
-    """Say if fewer faces came out than the file has entities for."""
-    lost = held - len(faces)
-    if lost <= 0:
-        return ()
-    return (f"{lost} of the {held} faces of the file could not be read and are missing",)
+def _missing(held: int, faces: tuple[cad_model.CadFace, ...]) -> int:
+    """Count what did not come out of a file that has entities for `held` faces."""
+    return max(0, held - len(faces))
 
 
 def _sort(

@@ -175,6 +175,7 @@ class CadSurface:
             face_names=tuple(face.name for face in self.model.faces),
             face_shapes=moved_shapes(shapes, self.model.meters, np.eye(3), np.zeros(3)),
             solids=np.array(self.model.solids, np.int32)[of_face],
+            missing_faces=self.model.missing + meshes.count(None),
         )
 
 
