@@ -15,7 +15,7 @@ import pytest
 import typer
 
 from sphshell_pin.cli import app, main
-from sphshell_pin.cli.common import echo, progress_bar
+from sphshell_pin.cli.common import echo, progress_bar, say
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.study import report
@@ -124,3 +124,8 @@ def test_on_a_pipe_lines_say_that_work_goes_on(capsys):
     assert capsys.readouterr().err.splitlines()[:2] == ["searching: 0.01 s", "searching: 0.02 s"]
     time.sleep(0.05)
     assert not capsys.readouterr().err.splitlines()[1:]  # one may be on its way
+
+
+def test_a_long_line_stays_one_on_a_pipe(capsys):
+    say(f"{'word ' * 100}end", bold="This")
+    assert capsys.readouterr().out.count("\n") == 1

@@ -80,12 +80,19 @@ def support(axes: np.ndarray, rotation: np.ndarray) -> float:
     return float(np.linalg.norm(axes * rotation[2]))
 
 
-def test_ellipsoid_by_its_support_function_and_by_its_own_surface() -> None:
-    """The depth of a curved shell is that of its own surface, which is off by order four.
+def lowest_of(shell: sp.Shell, rotation: np.ndarray, axes: np.ndarray) -> float:
+    """How far the curved surface itself reaches below the center of its ellipsoid.
 
-    The surface's lowest point from the definition: the closest point of ever farther points below
-    moves to it.
+    From the definition: the closest point of ever farther points below moves to the lowest one.
     """
+    down, point = -rotation[2], -(axes**2) * rotation[2] / support(axes, rotation)
+    for _ in range(40):
+        point = shell.closest_points((point + 5.0 * down)[None], method="smooth").points[0]
+    return float(down @ point)
+
+
+def test_ellipsoid_by_its_support_function_and_by_its_own_surface() -> None:
+    """The depth of a curved shell is that of its own surface, which is off by order four."""
     errors, axes = [], np.array([0.06, 0.04, 0.03])
     shells = [egg(cells, axes) for cells in (8, 16)]
     for shell in shells:
@@ -95,13 +102,20 @@ def test_ellipsoid_by_its_support_function_and_by_its_own_surface() -> None:
             found = scene.contacts(pose(rotation, reach - 1e-4))
             assert len(found.depth) == 1
             worst = max(worst, abs(found.depth[0] - 1e-4))
-            down, point = -rotation[2], -(axes**2) * rotation[2] / reach
-            for _ in range(40):
-                far = point + 5.0 * down
-                point = shell.closest_points(far[None], method="smooth").points[0]
-            assert found.depth[0] == pytest.approx(1e-4 - reach + down @ point, abs=2e-13)
+            below = lowest_of(shell, rotation, axes) - reach
+            assert found.depth[0] == pytest.approx(1e-4 + below, abs=2e-13)
         errors.append(worst)
     assert errors[1] < 0.12 * errors[0]
+
+
+def test_no_lowest_point_of_coarse_elements_is_lost() -> None:
+    """They turn by a right angle: the slopes' bounds are all that says where it may be."""
+    shell = egg(5)
+    scene = scene_of(shell)
+    for rotation in rotations(100):
+        reach = lowest_of(shell, rotation, AXES)
+        found = scene.contacts(pose(rotation, reach - 1e-3))
+        assert found.depth.max() > 1e-3 - 1e-12
 
 
 def test_spheres_and_tori_are_exact() -> None:

@@ -1,11 +1,13 @@
 """Friction that sticks: against closed forms, conserved quantities, and other meshes."""
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
-from tests import models
+from tests import meshes, models
+from tests.dynamics.scenes import free_ball
 from tests.models import run
 
 R = 0.05
@@ -123,3 +125,44 @@ def test_the_period_of_stick_slip(v_stribeck: float, percent: float) -> None:
     begins = run.t[np.flatnonzero(fast[1:] & ~fast[:-1])]
     found = 100 * (np.diff(begins)[1:].mean() / period() - 1)
     assert np.isclose(found, percent, atol=0.15)
+
+
+@pytest.mark.parametrize(("way", "kept"), [(0.9, 1.0), (1.1, 0.0)])
+def test_a_contact_goes_on_within_its_disc_and_else_begins_anew(way: float, kept: float) -> None:
+    """In a tight bore it moves 25 times as far as the center, `way` times sqrt(r^2 - (r-d)^2)."""
+    bore, depth, dt, along = 0.052, 1e-4, 1e-4, 0.2
+    angle = way * np.sqrt(R**2 - (R - depth) ** 2) / bore
+    wall = sp.Shell.from_geometry(coal.Cylinder(bore, 0.4), segments=96, side="inside")
+    law, friction = models.linear_law(K), sp.BristleFriction(9.0, 9.0, K, 0.0)
+    scene = models.on_shell(models.block(0.0), wall, law, friction)
+    # The center goes round the axis by the angle in one step.
+    off = bore - R + depth
+    round_axis = 2 * off * np.sin(angle / 2) / dt
+    v = [-round_axis * np.sin(angle / 2), round_axis * np.cos(angle / 2), along]
+    made = run(scene, sp.SemiImplicitEuler(dt), [off, 0.0, 0.0], v, dt, record_dt=dt)
+    assert len(made.contacts) == 2
+    assert made.contacts.friction_force_world[1, 2] == pytest.approx(
+        -kept * K * along * dt, rel=0.01
+    )
+
+
+def test_where_a_minimum_and_a_saddle_end_their_stretch_goes_on() -> None:
+    """A ball that spins in a trough of less radius: three places of touch become one."""
+    radius, height = 0.9, 0.93
+    vertices, quads = meshes.grid_plate(24, 60, 1.0, quads=True)
+    x = vertices[:, 0] - vertices[:, 0].mean()
+    vertices[:, 0], vertices[:, 2] = x, x**2 / (2 * radius)
+    vertices[:, 1] -= vertices[:, 1].mean()
+    normals = np.stack([-x / radius, 0 * x, 1 + 0 * x], axis=1)
+    trough = sp.Shell(vertices, quads, normals=normals, crease_angle=3.0)
+    friction = sp.BristleFriction(5.0, 5.0, 1e4, 0.0)
+    scene = free_ball(trough, models.linear_law(1e5), friction, gravity=0.0, mass=1e4)
+    v = np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.5])
+    made = run(scene, sp.RungeKutta4(1e-4), models.free_q([0, 0, height]), v, 0.12, record_dt=1e-3)
+    log = made.contacts
+    counts = np.bincount(np.searchsorted(made.t, log.t))
+    assert (counts[0], counts[-1]) == (3, 1)
+    force = np.zeros(len(made.t))
+    np.add.at(force, np.searchsorted(made.t, log.t), log.friction_force_world[:, 1])
+    # The slope after it, where the one that is left is far from the axis of the spin.
+    assert np.abs(np.diff(force)).max() == pytest.approx(force[-2] - force[-1], rel=0.1)

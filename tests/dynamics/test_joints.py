@@ -372,3 +372,14 @@ def test_the_energy_of_an_armature_counts_about_any_axis(axis: tuple[float, ...]
     run = sp.Simulation(sp.Scene(model), sp.Adaptive()).run(np.zeros(1), [speed], 0.01)
     inertia = 0.4 * 1.0 * 0.1**2 + 0.05
     assert run.energy.kinetic == pytest.approx(0.5 * inertia * speed**2, rel=1e-12)
+
+
+def test_slopes_of_springs_in_two_joints() -> None:
+    model = link(9.81)
+    body = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.3]))
+    joint = model.addJoint(1, pin.JointModelRY(), body, "second")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, 0.1), body)
+    friction = sp.JointFriction(0.5, stiffness=30.0, damping=0.4)
+    joints = sp.JointComponents(friction={"hinge": friction, "second": friction})
+    state = np.array([0.1, -0.2]), np.array([0.3, -0.2]), np.array([0.004, 0.03])
+    assert_rate_jacobian(sp.Scene(model, joints=joints), *state)

@@ -179,6 +179,21 @@ def test_one_corner_has_its_own_depth() -> None:
         assert found.point_world[0, :2] == pytest.approx(corner[:2], abs=1e-15)
 
 
+def test_the_other_end_of_an_edge_begins_to_share_where_the_maximum_says() -> None:
+    """With its lead l = L^2 / 2 - R rise and the ridge e: from l = -e on, (l + e) / (L^2 + 2 e)."""
+    shell, length = box(), 0.06
+    ridge = 1e-4 * shell.size**2
+    scene = scene_of(shell, linear_law(1e4))
+    for lead in (-1.5 * ridge, -0.5 * ridge, 0.5 * ridge, 2.0 * ridge):
+        rise = (length**2 / 2 - lead) / (CROWN * shell.size)
+        turn = pin.utils.rotate("y", rise / length) @ pin.utils.rotate("x", 0.6)
+        placed = shell.vertices @ turn.T
+        low, high = placed[np.argsort(placed[:, 2])[:2]]
+        found = scene.contacts(pose(turn, -low[2] - 1e-4))
+        share = (found.point_world[0, 0] - 0.3 - low[0]) / (high[0] - low[0])
+        assert share == pytest.approx(max(0.0, lead + ridge) / (length**2 + 2 * ridge), abs=1e-6)
+
+
 # Shell, inertia, and how they fall: on a corner, with a spin, or, as a coin or cone that is thrown
 # rolls on its rim without loss, put down obliquely.
 SOLIDS = {

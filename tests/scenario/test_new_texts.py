@@ -16,6 +16,7 @@ DRAFTS = {
     "hand_around_cylinder": (("allegro_right_hand", "cylinder"), {"tips": "all"}),
     "ball_in_bowl": (("ball", "bowl"), {}),
     "a1_on_plane": (("a1", "plane"), {}),
+    "ur5_on_box": (("ur5", "box"), {}),
 }
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 

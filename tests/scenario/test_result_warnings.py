@@ -92,6 +92,17 @@ def test_a_press_on_nothing_and_a_target_out_of_reach(scenario):
     assert float(far.split("than ")[1].split(" m")[0]) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.parametrize(("share", "lines"), [(0.045, 0), (0.055, 1)])
+def test_a_twentieth_of_the_robots_size_from_the_target_is_out_of_reach(share, lines):
+    robot = sp.robots.load("three_link_finger")
+    robot.model.gravity.setZero()
+    beside = pose_of(robot.model, robot.q0, "tip").translation
+    beside[0] += share * model_reach(robot.model)
+    control = sp.CartesianImpedance("tip", [beside], stiffness=0.0, damping=0.0)
+    result = sp.Simulation(sp.Scene(robot.model)).run(robot.q0, None, 1e-3, control)
+    assert len(control._result_warnings(result)) == lines
+
+
 def test_a_robot_whose_joints_are_at_one_place_is_as_large_as_its_links():
     """A cart with a pole: a target of 1e-10 m beside it is not out of its reach."""
     model = pin.Model()

@@ -8,6 +8,7 @@ import shutil
 import signal
 import stat
 import time
+from concurrent.futures import ThreadPoolExecutor
 from unittest.mock import Mock
 
 import pytest
@@ -148,6 +149,21 @@ def test_a_link_stays_a_link(tmp_path):
         file.write(b"newest")
     assert os.readlink(tmp_path / "file") == "far/a"
     assert (tmp_path / "far" / "a").read_text() == "newest"
+
+
+def test_two_that_write_one_file_take_turns(tmp_path):
+    path = tmp_path / "file"
+
+    def write_second():
+        with atomic_file(path) as file:
+            file.write(b"second")
+
+    with ThreadPoolExecutor(1) as pool, atomic_file(path) as file:
+        other = pool.submit(write_second)
+        time.sleep(0.2)
+        file.write(b"first")
+    other.result()
+    assert path.read_bytes() == b"second"
 
 
 def test_a_file_keeps_its_rights(tmp_path):

@@ -10,7 +10,7 @@ import pytest
 
 from sphshell_pin.contact.materials import find_material
 from sphshell_pin.errors import SphshellError
-from sphshell_pin.scenario.drafting.plan import Materials, press_force
+from sphshell_pin.scenario.drafting.plan import Materials, force_rise, press_force, press_gap
 from sphshell_pin.scenario.running.run import simulate
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
@@ -48,6 +48,20 @@ def test_a_tip_that_is_led_is_damped_by_seven_tenths(draft):
     mass = 1 / np.sqrt(mobility[2, 2] * slide)
     ratio = control.damping / (2 * np.sqrt(control.stiffness * mass))
     assert ratio == pytest.approx(0.7, rel=0.1)
+
+
+@pytest.mark.parametrize("mass", [5.0, 100.0])
+def test_a_large_mass_touches_with_a_seventh_of_force_times_depth(mass):
+    """Moved from rest over the gap by a force that comes on as a smooth step, 3 s^2 - 2 s^3."""
+    force = 1.0
+    rise = force_rise(RADIUS, force, mass, MATERIALS)
+    t = np.linspace(0.0, rise, 10001)
+    # The first and second integrals of the step.
+    speed = force / mass * rise * ((s := t / rise) ** 3 - s**4 / 2)
+    way = force / mass * rise**2 * (s**4 / 4 - s**5 / 10)
+    touch = np.interp(press_gap(RADIUS, force, mass, MATERIALS), way, speed)
+    energy = mass * touch**2 / 2 / (force * MATERIALS.depth(force, RADIUS))
+    assert 0.12 < energy < 0.15
 
 
 @pytest.mark.parametrize("share", [0.1, 0.49, 0.51, 0.79])

@@ -65,6 +65,8 @@ def points_on(face, shell):
 def test_elements_lie_on_their_faces(name):
     make, kinds = CASES[name]
     shell = make()
+    turn = pin.exp3(np.array([0.4, 0.8, -0.3]))
+    shell = sp.Shell(shell.vertices @ turn.T + [0.3, -0.2, 0.5], shell.elements)
     assert sorted(face.kind for face in shell.faces) == kinds
     every = np.concatenate([face.elements for face in shell.faces])
     assert len(np.unique(every)) == len(shell.elements)

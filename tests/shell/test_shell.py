@@ -146,6 +146,7 @@ def test_unclean_takes_elements_as_they_are():
     assert [list(e) for e in shell.elements] == quads
     expect(shell.health, vertices=16, cleaned=False, is_closed=True)
     assert not shell.health.repairs
+    assert "none given; taken as it came, not cleaned" in str(shell.health)
 
 
 def test_edges_and_patches_come_from_the_core(shell):

@@ -114,6 +114,7 @@ def test_the_picture_has_every_run_and_its_difference(finger):
     assert titles[:2] == [name, f"{name}, less that of one"]
     assert [line.get_label() for line in figure.axes[0].lines] == ["one", "two"]
     assert [line.get_label() for line in figure.axes[1].lines] == ["two"]
+    assert figure.get_suptitle() == "two beside one"
     assert "[N]" in figure.axes[0].get_ylabel()
     still = [run("still", [0, 1], [0, 0]), run("late", [2, 3], [0, 0])]
     plot_compare(still, compare(still))

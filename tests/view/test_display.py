@@ -101,6 +101,10 @@ def test_geometry_of_another_model_is_refused():
     reduced = pin.buildReducedModel(full, [2], pin.neutral(full))
     with pytest.raises(InvalidParameter, match="buildReducedModel"):
         filmed(of_arm(reduced), pin.neutral(reduced), visual_model=geometry)
+    # A joint that is there, and a frame of another one.
+    geometry.geometryObjects[-1].parentFrame = 1
+    with pytest.raises(InvalidParameter, match="must hang on a joint"):
+        filmed(of_arm(full), pin.neutral(full), visual_model=geometry)
 
 
 def test_a_plane_is_drawn_where_its_shell_is_and_the_eye_above_it():
