@@ -220,6 +220,7 @@ REFUSED: list[tuple[str, Call]] = [
     ("must be one of the two", lambda: switch(contact=None)),
     ("release = 2.0 must not be above threshold = 1", lambda: switch(release=2)),
     ("must be 'patch' or 'torque'", lambda: run(record=["force"])),
+    *(("record", lambda one=one: run(record=one)) for one in ("patch", ["pitch"], 3)),
     ("tau has shape", lambda: run(controller=lambda t, q, v, c: np.zeros(5), control_dt=1e-2)),
     *(("tau", lambda one=one: derive(one)) for one in (np.zeros(4), np.full(3, NAN), "heavy")),
 ]
