@@ -75,6 +75,10 @@ REFUSED: list[tuple[str, Call]] = [
     ("at a lone contact point", lambda: wrench(law=sp.HertzLaw(1e7, 0.3))),
     ("path", lambda: sp.Shell.from_file(None)),
     ("path", lambda: sp.Shell.from_file(3)),
+    (
+        "elements must not be masked",
+        lambda: sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2)),
+    ),
     # Laws
     ("units", lambda: sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="furlong")),
     ("young = -1.0 must be positive", lambda: sp.HertzLaw(-1.0, 0.3)),

@@ -108,10 +108,6 @@ def sensing(sensors):
     Simulation(Scene(ball()), None, sensors)
 
 
-def derive(tau):
-    Scene(arm()).dynamics_derivatives(ARM_Q, np.zeros(3), tau)
-
-
 def on_sphere(**more):
     add(shell=Sphere(0.1, "universe"), **more)
 
@@ -186,6 +182,7 @@ REFUSED: list[tuple[str, Call]] = [
     ("name = .* must be a name", lambda: on_plate(ball(), LAW).replace_pair(NAMES, law=LAW)),
     ("pair = .* must be a name", lambda: ShellTaxels(NAMES)),
     ("q = .* finite", lambda: run(HIGH * np.nan)),
+    ("t0", lambda: run(t0=1e13)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),
     *(("duration", lambda one=one: run(duration=one)) for one in (-1.0, NAN, np.inf)),
     ("fixed to the world", lambda: push("universe", [1, 0, 0])),
@@ -222,7 +219,10 @@ REFUSED: list[tuple[str, Call]] = [
     ("must be 'patch' or 'torque'", lambda: run(record=["force"])),
     *(("record", lambda one=one: run(record=one)) for one in ("patch", ["pitch"], 3)),
     ("tau has shape", lambda: run(controller=lambda t, q, v, c: np.zeros(5), control_dt=1e-2)),
-    *(("tau", lambda one=one: derive(one)) for one in (np.zeros(4), np.full(3, NAN), "heavy")),
+    *(
+        ("tau", lambda one=one: Scene(arm()).dynamics_derivatives(ARM_Q, np.zeros(3), one))
+        for one in (np.zeros(4), np.full(3, NAN), "heavy")
+    ),
 ]
 
 

@@ -71,12 +71,9 @@ def test_a_joint_that_moves_no_mass_is_named() -> None:
         scene.explain()
 
 
-def test_times_that_cannot_be_counted_are_refused() -> None:
+def test_rows_farther_apart_than_the_run_is_long() -> None:
     scene = sp.Scene(ball_model())
-    q = pin.neutral(scene.model)
-    with pytest.raises(InvalidParameter, match="t0"):
-        sp.Simulation(scene).run(q, None, 0.01, t0=1e13)
-    rows = sp.Simulation(scene).run(q, None, 0.01, record_dt=1e9)
+    rows = sp.Simulation(scene).run(scene.neutral, None, 0.01, record_dt=1e9)
     assert rows.t.tolist() == [0.0, 0.01]
 
 
@@ -91,23 +88,17 @@ def warned(words: str, *given, **more) -> bool:
     return any(words in one for one in explained(*given, **more))
 
 
-def test_one_sided_open_shells_are_warned_of() -> None:
-    assert warned("one-sided", TIP, sp.Shell(*meshes.grid_plate(), side="outside"))
-
-
-def test_a_radius_in_millimeters_is_suspected() -> None:
-    plate = sp.Shell(*meshes.grid_plate(), name="plate")
+def test_one_sided_open_shells_and_millimeters_taken_for_meters_are_warned_of() -> None:
+    vertices, elements = meshes.grid_plate()
+    plate = sp.Shell(vertices, elements)
+    assert warned("one-sided", TIP, sp.Shell(vertices, elements, side="outside"))
     with pytest.warns(UnitWarning, match="radius = 10 .* is more than the robot's reach"):
         assert warned("is it in mm?", sp.Sphere(10, "ball"), plate, models.arm())
-
-
-def test_millimeters_taken_for_meters_are_suspected() -> None:
-    vertices, elements = meshes.grid_plate()
     with pytest.warns(UnitWarning, match="'plate'.*unit='mm'"):
         assert warned("unit='mm'", TIP, sp.Shell(1000 * vertices, elements, name="plate"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        explained(TIP, sp.Shell(vertices, elements))
+        explained(TIP, plate)
 
 
 @pytest.mark.parametrize(
@@ -231,13 +222,6 @@ def read(force, **more):
 def test_data_that_cannot_be_computed_with_are_named() -> None:
     with pytest.raises(errors.DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
         read([1.0, 1e308])
-    with pytest.raises(
-        errors.DataError, match=r"'f.sigma' must be positive .*too small to compute with"
-    ):
+    with pytest.raises(errors.DataError, match=r"'f.sigma' must be positive .*too small to comp"):
         read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
     assert read(np.ma.masked_greater([1.0, 2.0], 1.5))[0].measured.tolist() == [1.0]
-
-
-def test_masked_elements_are_refused() -> None:
-    with pytest.raises(errors.InvalidShell, match="elements must not be masked"):
-        sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2))

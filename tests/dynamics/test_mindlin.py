@@ -282,53 +282,28 @@ def test_contacts_that_split_and_merge_share_one_bristle() -> None:
     assert counts.count(3) > 20
 
 
-class Path:
-    """Force, moment and work along a motion of one contact, by the law's own rates."""
-
-    def __init__(self, friction: sp.MindlinFriction) -> None:
-        self.friction = friction
-
-    def at(self, z, depth: float, closing: float, slip, spin: float):  # type: ignore[no-untyped-def]
-        velocity = np.array([*slip, -closing])
-        law, friction = LAW._binding, self.friction._binding
-        rest = np.zeros(3)
-        return _core.contact_force(law, friction, depth, UP, velocity, spin, rest, z, R, 1e-5)
-
-    def run(self, times, depth, slip, spin):  # type: ignore[no-untyped-def]
-        """Work (n,) of friction on what moves the bodies; functions of time give value and rate."""
-
-        def rate(t: float, y):  # type: ignore[no-untyped-def]
-            value, closing = depth(t)
-            _, drag, moment, z_rate = self.at(y[:3], value, closing, slip(t), spin(t))
-            return [*z_rate, drag[:2] @ slip(t) + moment[2] * spin(t)]
-
-        out = [np.zeros(4)]
-        for begin, end in pairwise(times):
-            step = solve_ivp(rate, (begin, end), out[-1], rtol=1e-9, atol=1e-16, method="LSODA")
-            assert step.success
-            out.append(step.y[:, -1])
-        return np.array(out)
-
-
 def test_cycle_of_elata_and_berryman() -> None:
     """Slip at a high load, back at a low one: incremental laws gain (k_1 - k_2) s^2 / 2.
 
     Here the force falls with the load, and that energy is lost.
     """
-    high, low, shift = 4e-4, 1e-4, 1e-6
-    depths = [high, high, low, low, high]
-    slips = [0.0, shift, shift, 0.0, 0.0]
-
-    def leg(values: list[float], t: float) -> tuple[float, float]:
-        k = min(int(t), 3)
-        return values[k] + (t - k) * (values[k + 1] - values[k]), values[k + 1] - values[k]
-
-    path = Path(STICKS)
-    rows = path.run(
-        range(5), lambda t: leg(depths, t), lambda t: [leg(slips, t)[1], 0.0], lambda t: 0.0
-    )
+    high, low, shift, rest = 4e-4, 1e-4, 1e-6, np.zeros(3)
     k_1, k_2 = (STICKS.tangential_stiffness(disc(d)) for d in (high, low))
-    assert rows[1, 3] == pytest.approx(-k_1 * shift**2 / 2, rel=1e-6)
-    assert rows[3, 3] == pytest.approx(-(k_1 - k_2) * shift**2 / 2, rel=1e-6)
+    # Depth and slip at the corners; of each side the stretch at its end, and the work so far.
+    corners = np.array([[high, 0.0], [high, shift], [low, shift], [low, 0.0], [high, 0.0]])
+    ends = [np.zeros(4)]
+    for begin, end in pairwise(corners):
+        closing, slip = end - begin
+
+        def rate(t, y, depth=begin[0], closing=closing, slip=slip):  # type: ignore[no-untyped-def]
+            where = depth + t * closing, UP, np.array([slip, 0.0, -closing]), 0.0, rest, y[:3]
+            found = _core.contact_force(LAW._binding, STICKS._binding, *where, R, 1e-5)
+            return [*found[3], found[1][0] * slip]
+
+        side = solve_ivp(rate, (0.0, 1.0), ends[-1], rtol=1e-9, atol=1e-16, method="LSODA")
+        assert side.success
+        ends.append(side.y[:, -1])
+    assert ends[1][3] == pytest.approx(-k_1 * shift**2 / 2, rel=1e-6)
+    assert ends[3][3] == pytest.approx(-(k_1 - k_2) * shift**2 / 2, rel=1e-6)
     # Back at the start nothing is left: the force that the bodies took apart is gone.
-    assert np.abs(rows[-1, :3]).max() < 1e-6 * np.abs(rows[1, :3]).max()
+    assert np.abs(ends[4][:3]).max() < 1e-6 * np.abs(ends[1][:3]).max()
