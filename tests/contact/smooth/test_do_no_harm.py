@@ -99,10 +99,8 @@ def test_propeller(radii: tuple[float, float]) -> None:
     rng, count = np.random.default_rng(0), 2000
     which, on_flat = random_places(shell.vertices[shell.triangles], count, rng)
     radius = np.exp(rng.uniform(*np.log(radii), count))
-    outside = ((1 - rng.uniform(0.05, 0.2, count)) * radius)[:, None] * shell.triangle_normals[
-        which
-    ]
-    depth, _ = shell.contacts_batch(on_flat + outside, radius)
+    away = (1 - rng.uniform(0.05, 0.2, count)) * radius
+    depth, _ = shell.contacts_batch(on_flat + away[:, None] * shell.triangle_normals[which], radius)
     assert (depth > 0).all()
 
 
@@ -129,3 +127,12 @@ def test_noise_above_the_curvature_stays_flat() -> None:
         curved.append(np.mean(core.bending == 0))
     assert curved[0] >= 0.99
     assert curved[1] <= 0.1
+
+
+@pytest.mark.parametrize("columns", [16, 40])
+def test_normals_estimated_on_spheres_are_exact(columns: int) -> None:
+    """From elements of longitude and latitude alone, however narrow near the poles."""
+    polar = np.linspace(0.05, np.pi - 0.05, columns)
+    vertices, elements = meshes.revolved(np.stack([np.sin(polar), -np.cos(polar)], 1), columns)
+    found = Shell(vertices, elements).core_for("smooth").corner_normals
+    assert np.abs(found - vertices[elements]).max() <= 1e-9

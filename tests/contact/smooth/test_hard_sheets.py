@@ -68,10 +68,8 @@ def test_flat_tube() -> None:
     across = np.stack([3 * np.cos(turn), 0 * turn, 0.45 * np.sin(turn)], axis=1)
     out = np.stack([0.45 * np.cos(turn), 0 * turn, 3 * np.sin(turn)], axis=1)
     out /= np.linalg.norm(out, axis=1)[:, None]
-    vertices = np.concatenate([across + [0.0, y, 0.0] for y in np.linspace(-2, 2, 9)])
-    first = np.arange(8 * 48)
-    second = first // 48 * 48 + (first + 1) % 48
-    elements = np.stack([first, second, second + 48, first + 48], axis=1)
+    rails = [across + [0.0, y, 0.0] for y in np.linspace(-2, 2, 9)]
+    vertices, elements = meshes.ribbon(rails, closed=True)
     shell = Shell(vertices, elements, normals=np.tile(-out, (9, 1)), crease_angle=1.5)
     assert shell.num_patches == 1
     for z in np.linspace(-0.3, 0.3, 61):

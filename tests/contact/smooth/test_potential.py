@@ -7,13 +7,10 @@ import pytest
 
 from tests.contact.helpers import energy, force_sum
 from tests.contact.smooth.surfaces import SURFACES, shell_of
+from tests.contact.smooth.sweeps import query
 from tests.contact.walks import borders, label
 
 CURVED = ("bowl", "dome", "torus inside", "wavy above", "wavy below")
-
-
-def query(shell, center):
-    return shell.contacts(center, 1.0, method="smooth")
 
 
 def crossings(name: str, h: float, depth: float, count: int, width: float, seed: int = 0):
@@ -37,9 +34,7 @@ def gradient_error(shell, center, step: float) -> float | None:
     feature takes over within the step."""
     here = query(shell, center)
     force, slope = force_sum(here), np.zeros(3)
-    for k in range(3):
-        move = np.zeros(3)
-        move[k] = step
+    for k, move in enumerate(step * np.eye(3)):
         ahead, behind = query(shell, center + move), query(shell, center - move)
         if label(ahead) != label(here) or label(behind) != label(here):
             return None

@@ -28,6 +28,7 @@ WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 FOLDER = os.environ.get("SPHSHELL_FOLDER")
+REDUCED = sorted((Path(__file__).parents[2] / "data" / "reduced").glob("*.npz"))
 
 # The others are studies.
 SOME = {
@@ -208,3 +209,29 @@ def test_potential_does_not_jump(name: str, ways) -> None:
         if not share <= 1e-6:
             jumps[int(i)] = share
     assert not jumps
+
+
+def test_the_reduced_meshes_are_there() -> None:
+    assert len(REDUCED) == 8
+
+
+@pytest.mark.parametrize("path", REDUCED, ids=lambda path: path.stem)
+def test_potential_does_not_jump_on_reduced_meshes(path: Path) -> None:
+    """The smallest meshes, cut out of real surfaces, on which that of earlier versions jumped.
+
+    Each file holds vertices V and corner normals N of triangles T, in units of the sphere's radius,
+    and two centres a, b between which the potential jumped. It does not: between the two, on a
+    longer line through them, and on lines beside it.
+    """
+    mesh, rng = np.load(path), np.random.default_rng(0)
+    shell = Shell(mesh["V"], mesh["T"], normals=mesh["N"])
+    look = partial(shell.contacts, radius=1.0, method="smooth")
+    a, b = mesh["a"], mesh["b"]
+    assert energy(look(a)) > 0
+    along = (b - a) / np.linalg.norm(b - a)
+    lines = [(a, b), (a - 0.01 * along, b + 0.01 * along)]
+    for reach in np.repeat([1e-9, 1e-6, 1e-3, 0.03], 10):
+        lines.append((a + reach * rng.normal(size=3), b + reach * rng.normal(size=3)))
+    for line in lines:
+        start, end = steepest_between(look, *line, 1e-9)
+        assert jump(look(start), look(end), end - start) <= 1e-6
