@@ -36,15 +36,11 @@ def disc(depth: float) -> float:
 
 def test_stiffness_of_equal_bodies() -> None:
     """Of one material 8 G* a is 4 G a / (2 - nu), and 16/3 G a^3 of two is 8/3 of one's."""
-    one = sp.MindlinFriction(0.5, 0.4, *RUBBER)
-    both = sp.MindlinFriction(0.5, 0.4, *RUBBER, *RUBBER)
-    for law in (one, both):
-        assert law.tangential_stiffness(0.01) == pytest.approx(
-            4 * shear(*RUBBER) * 0.01 / (2 - RUBBER[1]), rel=1e-14
-        )
-        assert law.torsional_stiffness(0.01) == pytest.approx(
-            8 / 3 * shear(*RUBBER) * 0.01**3, rel=1e-14
-        )
+    modulus = shear(*RUBBER)
+    expected = 4 * modulus * 0.01 / (2 - RUBBER[1]), 8 / 3 * modulus * 0.01**3
+    for law in (sp.MindlinFriction(0.5, 0.4, *RUBBER, *more) for more in ((), RUBBER)):
+        found = law.tangential_stiffness(0.01), law.torsional_stiffness(0.01)
+        assert found == pytest.approx(expected, rel=1e-14)
 
 
 def after(depth: float, motion: pin.Motion, time: float) -> tuple[pin.Force, pin.Force]:
@@ -236,14 +232,19 @@ OVER_GROOVES = [
 ]
 
 
+def over_a_groove(angle: float, friction: sp.Friction, dissipation: float = 0.5) -> sp.Scene:
+    """A ball of radius 0.1 over a groove whose sides rise by `angle`."""
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
+    law = sp.HuntCrossleyLaw(3e5, 1.5, dissipation)
+    return models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
+
+
 @pytest.mark.parametrize(("friction", "degrees"), OVER_GROOVES)
 def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:  # type: ignore[no-untyped-def]
     """Where contacts split and merge; and Mindlin's friction gives nothing back."""
     given_back = 1e-6 if isinstance(friction, sp.MindlinFriction) else 1.0
     angle = math.radians(degrees)
-    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
-    law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
-    scene = models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
+    scene = over_a_groove(angle, friction)
     height = 0.1 / math.cos(angle) + 0.02 * math.tan(angle) - 5e-4
     jumps = []
     for record_dt in (2e-4, 2.5e-5):
@@ -263,13 +264,12 @@ def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:
 def test_contacts_that_split_and_merge_share_one_bristle() -> None:
     """A ball that rolls over a groove while 1 N along it holds: each contact carries all of it."""
     angle, radius, dt = math.radians(1), 0.1, 1e-3
-    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
-    friction, law = sp.BristleFriction(0.4, 0.3, 1e4), sp.HuntCrossleyLaw(3e5, 1.5, 0.0)
-    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
+    scene = over_a_groove(angle, sp.BristleFriction(0.4, 0.3, 1e4), 0.0)
     x = np.linspace(-0.004, 0.004, 100)
     z = radius / math.cos(angle) - 5e-4 + np.abs(x) * math.tan(angle)
-    state = scene.state(models.free_q([x[0], 0.1, z[0]]), np.zeros(6))
-    state.advance(models.free_q([x[0], 0.1, z[0]]), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
+    start = models.free_q([x[0], 0.1, z[0]])
+    state = scene.state(start, np.zeros(6))
+    state.advance(start, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
     counts = []
     for k in range(1, len(x)):
         q, speed = models.free_q([x[k], 0.1, z[k]]), (x[k] - x[k - 1]) / dt
