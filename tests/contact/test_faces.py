@@ -51,7 +51,7 @@ def deepest(shell: sp.Shell, centers, radius: float):
 def test_contacts_are_those_of_the_trimmed_faces(name, step):
     path = step if name == "block" else VALVE_BODY
     assert all(face.exact for face in sp.Shell.from_file(path).faces)
-    assert walk_file(path, name, 2000, np.random.default_rng(2)).found() == {}
+    assert walk_file(path, name, 2000, np.random.default_rng(2)).faults == {}
 
 
 def test_beside_the_apex_of_a_cone_a_sphere_touches_once(tmp_path):
