@@ -12,6 +12,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from tests import models
+from tests.hard_cases import balls
+from tests.hard_cases.analytic_impact import touch_time
 from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 EPS = float(np.finfo(float).eps)
@@ -147,13 +149,11 @@ def bounce(radius: float, integrator: Any) -> tuple[float, float]:
     mass, depth = 4e3 / 3 * math.pi * radius**3, 0.05 * radius
     law = sp.ImpactLaw(1.25 * mass / depth**2.5, 1.5)
     scene = on_plate(models.slider(0.0, mass), law, radius)
-    form = 2 * depth * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
-    result = sp.Simulation(scene, integrator).run(
-        np.array([1.01 * radius]), np.array([-1.0]), duration=0.02 * radius + 1.1 * form
-    )
+    form = touch_time(1.5, depth, 1.0)
+    duration = 0.02 * radius + 1.1 * form
+    result = sp.Simulation(scene, integrator).run([1.01 * radius], [-1.0], duration)
     touch, lift = (
-        next((e.t for e in result.events if e.kind == kind), math.nan)
-        for kind in ("touch", "lift_off")
+        next(iter(balls.event_times(result, kind)), math.nan) for kind in ("touch", "lift_off")
     )
     return float(result.v[-1, 0]), (lift - touch) / form
 
