@@ -52,14 +52,12 @@ def poses(model, q):
 def weight(model, q, at="mount", parts=BEYOND):
     """Force and torque that carry the weight of the parts, in the frame `at`."""
     pose = poses(model, q)
-    force, torque = np.zeros(3), np.zeros(3)
+    total = pin.Force.Zero()
     for name in parts:
         mass, com, _ = PARTS[name]
-        up = np.array([0.0, 0.0, 9.81 * mass])
-        force += up
-        torque += np.cross(pose[name].act(np.array(com)) - pose[at].translation, up)
-    turn = pose[at].rotation.T
-    return np.concatenate([turn @ force, turn @ torque])
+        up, arm = np.array([0.0, 0.0, 9.81 * mass]), pose[name] * np.array(com)
+        total += pin.Force(up, np.cross(arm, up))
+    return pose[at].actInv(total).vector
 
 
 def read(scene, q, controller, sensors, duration=0.0, **more):
@@ -120,8 +118,7 @@ def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     pose = poses(model, q)["mount"]
     push = np.array([0.0, 0.0, law.normal_force(depth)])
     arm_of_force = center - [0, 0, radius] - pose.translation
-    contact = np.concatenate([push, np.cross(arm_of_force, push)])
-    contact = np.concatenate([pose.rotation.T @ contact[:3], pose.rotation.T @ contact[3:]])
+    contact = np.ravel([pose.rotation.T @ one for one in (push, np.cross(arm_of_force, push))])
     assert push[2] > 5
     seen = result.sensors["wrist"].values[0]
     assert np.abs(seen - (weight(model, q) - contact)).max() < 1e-10
@@ -163,10 +160,8 @@ def test_a_joint_torque_at_rest_carries_the_weight():
 
 
 def test_a_push_from_outside_is_felt():
-    model = models.slider()
-    simulation = sp.Simulation(
-        sp.Scene(model), sp.SemiImplicitEuler(1e-3), [sensor("ball_joint", rate=1000)]
-    )
+    scene, given = sp.Scene(models.slider()), [sensor("ball_joint", rate=1000)]
+    simulation = sp.Simulation(scene, sp.SemiImplicitEuler(1e-3), given)
     run = OpenRun(simulation, [0.0], record_dt=1e-3, controller=sp.GravityCompensation())
     run.advance(0.01)
     run.push("ball", [3.0, -4.0, 7.0])

@@ -12,18 +12,8 @@ import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import SetupWarning
 from tests.contact.test_planes import pose, scene_of
+from tests.dynamics import test_planes as planes
 from tests.dynamics.test_derivatives import assert_derivatives, assert_rows
-from tests.dynamics.test_planes import (
-    BOX,
-    FRICTIONS,
-    SPUN,
-    assert_at_rest,
-    box,
-    fallen,
-    over_plane,
-    reach_of,
-    touching,
-)
 from tests.meshes import cube, grid_plate
 from tests.models import linear_law
 
@@ -52,8 +42,8 @@ def solid(geometry: object) -> sp.Shell:
 
 
 SHELLS = {
-    "box": (box, np.eye(3)),
-    "box on an edge": (box, pin.utils.rotate("x", 0.6)),
+    "box": (planes.box, np.eye(3)),
+    "box on an edge": (planes.box, pin.utils.rotate("x", 0.6)),
     "wedge": (lambda: prism(TRIANGLE, 0.02), np.eye(3)),
     "coin": (lambda: solid(COIN), np.eye(3)),
     "roller": (lambda: solid(ROLLER), pin.utils.rotate("x", np.pi / 2)),
@@ -66,16 +56,16 @@ def lying(name, law, friction, *, ground=True, tilt=0.2):
     """A body that lies flat but for a share of the crown's tilt, and its state."""
     make, flat = SHELLS[name]
     shell = make()
-    scene = over_plane(shell, law, friction, ground=ground)
+    scene = planes.over_plane(shell, law, friction, ground=ground)
     lean = np.random.default_rng(5).normal(size=3) * [1, 1, 0]
     lean *= tilt / CROWN / np.linalg.norm(lean)
     turn = pin.exp3(lean) @ pin.utils.rotate("z", 0.4) @ flat
-    q, v = touching(scene, 2e-4, 5, turn, reach_of(shell))
+    q, v = planes.touching(scene, 2e-4, 5, turn, planes.reach_of(shell))
     return scene, q, v / 15  # so that all corners press
 
 
 @pytest.mark.parametrize("ground", [True, False])
-@pytest.mark.parametrize("friction", FRICTIONS)
+@pytest.mark.parametrize("friction", planes.FRICTIONS)
 @pytest.mark.parametrize("name", SHELLS)
 def test_derivatives_are_those_of_finite_differences(name: str, friction, ground: bool) -> None:
     # Steps of the differences are a share of the crown's tilt.
@@ -90,7 +80,7 @@ def test_derivatives_are_those_of_finite_differences(name: str, friction, ground
 @pytest.mark.parametrize("name", ["box", "coin"])
 def test_derivatives_where_places_slide_in_different_directions(name: str) -> None:
     """Round the normal: what friction adds at each does not cancel in their sum."""
-    scene, q, v = lying(name, LAW, FRICTIONS[1])
+    scene, q, v = lying(name, LAW, planes.FRICTIONS[1])
     assert_derivatives(scene, q, v + np.array([0.03, 0.0, 0.0, 0.0, 0.0, 3.0]))
 
 
@@ -166,7 +156,7 @@ def test_division_of_a_face_changes_nothing() -> None:
 
 def test_one_corner_has_its_own_depth() -> None:
     """As soon as the others are above it by the square of their distance over 2 R."""
-    shell = box()
+    shell = planes.box()
     scene = scene_of(shell, linear_law(1e4))
     for tilt in (4.0 / CROWN, 1e-2, 0.5):
         turn = pin.exp3(tilt * np.array([0.6, -0.8, 0.0]))
@@ -181,15 +171,15 @@ def test_one_corner_has_its_own_depth() -> None:
 # Shell, inertia, and how they fall: on a corner, with a spin, or, as a coin or cone that is thrown
 # rolls on its rim without loss, put down obliquely.
 SOLIDS = {
-    "box": (box, BOX, (0.5, 0.3), SPUN),
+    "box": (planes.box, planes.BOX, (0.5, 0.3), planes.SPUN),
     "coin": (SHELLS["coin"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.004), (0.3, 0.1), [0] * 6),
     "cone": (SHELLS["cone"][0], pin.Inertia.FromCylinder(0.2, 0.02, 0.06), (2.03, 0.0), [0] * 6),
 }
 
 
 INTEGRATORS = [sp.Adaptive(1e-7, 1e-10), sp.Implicit(1e-7, 1e-10), sp.RungeKutta4(5e-5)]
-FALLS = [("box", one, friction) for one in INTEGRATORS for friction in FRICTIONS[1:]]
-FALLS += [(name, one, FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS]
+FALLS = [("box", one, friction) for one in INTEGRATORS for friction in planes.FRICTIONS[1:]]
+FALLS += [(name, one, planes.FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS]
 
 
 @pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
@@ -198,7 +188,8 @@ def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction
     make, inertia, turn, v = SOLIDS[name]
     duration = 1.0 if name == "box" else 0.5
     more = {"v": v, "turn": turn, "duration": duration, "record_dt": 1e-3}
-    assert_at_rest(fallen(make, inertia, LAW, friction, integrator, **more), 20_000 * duration)
+    result = planes.fallen(make, inertia, LAW, friction, integrator, **more)
+    planes.assert_at_rest(result, 20_000 * duration)
 
 
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction(0.4, 0.4, 0.01, 0.1)])
@@ -206,7 +197,8 @@ def test_fixed_steps_resolve_where_damping_and_friction_come_on(friction) -> Non
     """Damping comes on within two steps of the fall, friction within some at the impact."""
     sides, law = (0.1, 0.06, 0.04), sp.ImpactLaw(1e5, 1.0, 20.0, 1e-4)
     inertia, more = pin.Inertia.FromBox(0.5, *sides), {"duration": 0.2, "record_dt": 1e-3}
-    result = fallen(lambda: box(sides), inertia, law, friction, sp.RungeKutta4(5e-5), **more)
+    falls = lambda: planes.box(sides), inertia, law, friction, sp.RungeKutta4(5e-5)
+    result = planes.fallen(*falls, **more)
     assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
 
 

@@ -14,15 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.oracle.geometry import (
-    Array,
-    closest_on_triangles,
-    cross,
-    dot,
-    feature_normal,
-    gaps,
-    norm,
-)
+from tests.oracle import geometry
+from tests.oracle.geometry import Array, closest_on_triangles, cross, dot, gaps, norm
 
 # All relative to the size of the problem (largest coordinate met): on the same point, must, may.
 SAME_POINT = 1e-9
@@ -115,7 +108,7 @@ def facets(
     if side != "both":
         sign = 1.0 if side == "outside" else -1.0
         nearest = points[distances.argmin()]
-        outward = sign * feature_normal(nearest, corners, SAME_POINT * size)
+        outward = sign * geometry.feature_normal(nearest, corners, SAME_POINT * size)
         if dot(center - nearest, outward) < 0:
             distance = distances.min()
             if distance >= radius:
@@ -140,7 +133,7 @@ def facets(
         possible = possible or _some_nudge_holds(center, point, nudges, near, size)
         sure = certain and bool(norm(away) < radius - EDGE_OF_REACH * size)
         if side != "both" and possible:
-            lift = dot(away, sign * feature_normal(point, corners, SAME_POINT * size))
+            lift = dot(away, sign * geometry.feature_normal(point, corners, SAME_POINT * size))
             sure &= bool(lift > DOUBTFUL * size)
             possible &= bool(lift > -DOUBTFUL * size)
         if possible:
