@@ -4,8 +4,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 from scipy.optimize import brentq, curve_fit
-from scipy.spatial import ConvexHull
 
 import sphshell_pin as sp
 from sphshell_pin import testing
@@ -127,10 +127,8 @@ def clipped(vertices: np.ndarray, edges: np.ndarray) -> tuple[float, np.ndarray]
     over = a[:, 2] * b[:, 2] < 0
     t = (a[over, 2] / (a[over, 2] - b[over, 2]))[:, None]
     points = np.vstack([vertices[vertices[:, 2] <= 0], a[over] + t * (b[over] - a[over])])
-    hull = ConvexHull(points)
-    tops, inside = hull.points[hull.simplices], hull.points[hull.vertices].mean(axis=0)
-    volumes = np.abs(np.linalg.det(tops - inside)) / 6
-    return volumes.sum(), volumes @ (tops.sum(axis=1) + inside) / 4 / volumes.sum()
+    part = trimesh.convex.convex_hull(points)
+    return part.volume, part.center_mass
 
 
 def edges_of(shell: sp.Shell) -> np.ndarray:
