@@ -25,9 +25,8 @@ TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0
 
 
 def wrench(point=ZEROS, normal=UP, depth=0.01, **more):
-    sp.contact_wrench(
-        point, normal, depth, **{"motion_i": STILL, "motion_j": STILL, "law": LAW, **more}
-    )
+    given = {"motion_i": STILL, "motion_j": STILL, "law": LAW, **more}
+    sp.contact_wrench(point, normal, depth, **given)
 
 
 def batch(centers=(3, 3), radii=(1.0, 1.0, 1.0), **more):

@@ -20,10 +20,9 @@ from tests import models
 from tests.contact.test_table_law import LAW_LINE, SPRING, TABLE
 from tests.scenario.files import DROP, write
 
-FORCE = ctypes.CFUNCTYPE(
-    ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double)
-)
-ENERGY = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
+NUMBER, LIST = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
+FORCE = ctypes.CFUNCTYPE(NUMBER, NUMBER, NUMBER, LIST)
+ENERGY = ctypes.CFUNCTYPE(NUMBER, NUMBER, LIST)
 NUMBERS, SLIP = {"k": 1e6, "b": 0.5}, {"mu": 0.3, "v": 0.1}
 TWIN = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 SMOOTH = sp.CoulombFriction(0.3, 0.3, 0.1, 0.2)  # a cubic up to 0.1 m/s
@@ -211,18 +210,15 @@ def test_no_number_is_refused(wrong) -> None:
 
 def test_friction_that_follows_from_the_load_by_no_coefficient() -> None:
     """Adhesion: a part of the force that is there whatever the load."""
-    own = sp.FunctionFriction(
-        FORCE(lambda slip, normal, p: (p[0] + 0.2 * normal) * min(slip / 0.01, 1.0)),
-        {"adhesion": 3.0},
-    )
+    size = FORCE(lambda slip, normal, p: (p[0] + 0.2 * normal) * min(slip / 0.01, 1.0))
+    own = sp.FunctionFriction(size, {"adhesion": 3.0})
     scene = models.on_plate(models.ball(), TWIN, own)
     contacts = scene.contacts(BALL, MOVES)
     (normal,), (friction,) = contacts.normal_force, contacts.friction_force_world
     assert np.linalg.norm(friction) == pytest.approx(3.0 + 0.2 * normal, rel=1e-12)
     assert own.coefficient(1.0, 10.0) == pytest.approx(0.5)
-    slopes = scene.dynamics_derivatives(
-        BALL, MOVES, np.zeros(6), parameters=["ball-plate.friction.adhesion"]
-    )
+    names = ["ball-plate.friction.adhesion"]
+    slopes = scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)
     # Of 1 N more of it.
     pushed = scene.model.inertias[1].mass * slopes.by_parameters[:3, 0]
     np.testing.assert_allclose(pushed, friction / np.linalg.norm(friction), rtol=0, atol=1e-6)

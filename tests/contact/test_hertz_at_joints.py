@@ -109,8 +109,7 @@ def test_a_ball_that_slides_over_joints_keeps_its_energy(faces: bool) -> None:
     for one in (law, law.on_plane(RADIUS)):
         several = scene(one, halfpipe(faces=faces), 9.81)
         start = np.array([0.0, 0.002, RADIUS - depth])
-        run = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11)).run(
-            start, np.array([0.25, 0.0, 0.0]), 1.0
-        )
+        simulation = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11))
+        run = simulation.run(start, np.array([0.25, 0.0, 0.0]), 1.0)
         residuals.append(np.abs(run.energy.residual).max() / run.energy.kinetic[0])
     assert residuals[0] < 5 * residuals[1] + 1e-6

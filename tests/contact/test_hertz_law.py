@@ -41,9 +41,8 @@ class Surface:
         h, along = self.step, np.array(self.slopes(u, v))
         turns = [self.normal(u + h, v) - self.normal(u - h, v)]
         turns.append(self.normal(u, v + h) - self.normal(u, v - h))
-        return np.sort(
-            np.linalg.eigvals(np.linalg.solve(along @ along.T, np.array(turns) @ along.T)) / (2 * h)
-        )
+        shape = np.linalg.solve(along @ along.T, np.array(turns) @ along.T) / (2 * h)
+        return np.sort(np.linalg.eigvals(shape))
 
     def shell(self, *, exact=True):
         normals = self.normals if exact else None
@@ -177,10 +176,8 @@ def test_a_loss_tangent_is_that_of_a_small_oscillation() -> None:
     depth, amplitude, omega = 1e-4, 1e-7, 2 * np.pi * frequency
     phase = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
     rate = amplitude * omega * np.cos(phase)
-    force = [
-        law.normal_force(depth + amplitude * np.sin(a), -r)
-        for a, r in zip(phase, rate, strict=True)
-    ]
+    depths = depth + amplitude * np.sin(phase)
+    force = [law.normal_force(*one) for one in zip(depths, -rate, strict=True)]
     lost = np.mean(force * rate) * (2 * np.pi / omega)
     stored = 0.5 * law.normal_stiffness(depth) * amplitude**2
     assert np.isclose(lost / (2 * np.pi * stored), tangent, rtol=1e-5)

@@ -139,9 +139,8 @@ def test_a_border_that_runs_through_the_facet_beside_its_own():
 
 def test_a_border_to_a_free_form_face_ends_on_its_face(folder):
     """Of a boss whose fillet is no simple face: it is exact, and nothing is lost."""
-    solid = occ.fuse(
-        occ.box([-20, -20, 0], [20, 20, 8]), occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
-    )
+    boss = occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
+    solid = occ.fuse(occ.box([-20, -20, 0], [20, 20, 8]), boss)
     at_foot = occ.edges_where(
         solid, lambda p: abs(p[0, 2] - 8) < 1e-6 > np.ptp(p[:, 2]) and np.abs(p).max() < 12
     )

@@ -88,10 +88,8 @@ def stacked_depths(upper: float, lower: float, integrator: Any) -> tuple[list[fl
         models.add_body(model, name, pin.JointModelPZ(), inertia=inertia)
     scene = sp.Scene(model)
     expected = [whole * GRAVITY / 1e6, upper * GRAVITY / 1e6]
-    for ball, frame, height, carried in (
-        ("low", "universe", 0.0, whole),
-        ("high", "low", 0.02, upper),
-    ):
+    stack = ("low", "universe", 0.0, whole), ("high", "low", 0.02, upper)
+    for ball, frame, height, carried in stack:
         law, top = damped(carried, 1e6, carried * GRAVITY / 1e6), np.array([0.0, 0.0, height])
         placed = pin.SE3(np.eye(3), top)
         scene.add_contact(sp.Sphere(0.01, ball), models.plate(0.2), frame, placed, law=law)

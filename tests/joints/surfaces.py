@@ -95,9 +95,8 @@ class Surface:
             return np.column_stack([turn, z / np.cos(self.second)])
         if self.kind == "Sphere":
             return np.column_stack([turn, np.arctan2(z, np.hypot(x, y))])
-        return np.column_stack(
-            [turn, np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)]
-        )
+        tilt = np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)
+        return np.column_stack([turn, tilt])
 
     def state(self, uv: Array) -> int:
         """1 inside, 0 on the border, -1 outside."""

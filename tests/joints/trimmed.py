@@ -265,9 +265,8 @@ class TrimmedSolid:
             if distance[k] < radii[row] + (off if simple else 0.0):
                 passes[row].append((radii[row] - distance[k], off if simple else 0.0))
                 if distance[k] < radii[row] and least[k] > -1e-6:
-                    found[row].append(
-                        (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
-                    )
+                    depth, sure = radii[row] - distance[k], bool(least[k] > 1e-6)
+                    found[row].append((points[k], depth, sure, False, off))
 
     def _nearest(self, edge: Edge, centers: Array) -> tuple[Ints, Array, Array, Array]:
         """Rows of centers, the closest points of an edge, tangents, and whether inside it."""

@@ -60,9 +60,8 @@ def push_box(angle: float, duration: float) -> tuple[Array, Array, Array]:
     along = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle)), 0.0])
     push = np.zeros(model.nv)
     push[:3] = FORCE * along
-    result = sp.Simulation(scene, sp.RungeKutta4(2e-4)).run(
-        q0, None, duration, lambda t, q, v, contacts: push, record_dt=0.01
-    )
+    simulation, control = sp.Simulation(scene, sp.RungeKutta4(2e-4)), lambda *_: push
+    result = simulation.run(q0, None, duration, control, record_dt=0.01)
     turns, moves = (result.q[:, 3:7], result.q[:, 10:14]), (result.v[:, :3], result.v[:, 6:9])
     both = np.stack([turned(*one) for one in zip(turns, moves, strict=True)], axis=1)
     return result.t, both @ along, np.linalg.norm(np.cross(both, along), axis=2)

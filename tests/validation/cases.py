@@ -124,10 +124,8 @@ def within(
     aim: float, *errors: tuple[str, float], unit: str = "", why: str = "", sense: Sense = "<="
 ) -> list[Figure]:
     """Return figures of errors (what, error), of which only the size counts."""
-    return [
-        Figure("", what, abs(float(error)), unit, aim=aim, sense=sense, why=why)
-        for what, error in errors
-    ]
+    more = {"aim": aim, "sense": sense, "why": why}
+    return [Figure("", what, abs(float(error)), unit, **more) for what, error in errors]
 
 
 # What a case states of itself is in cases.toml.

@@ -160,10 +160,8 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
             findings += within(bound, (f"{title}, sliding", rms(errors[slide])))
             stick = f"{title}, sticking", rms(errors[~slide])
             findings += within(bound, stick, why=WHY["damped"])
-        ours = [
-            (f"ours, {name}", drawn, after_spinning(one, drawn, quantity))
-            for name, one in spheres.items()
-        ]
+        seen = {name: after_spinning(one, drawn, quantity) for name, one in spheres.items()}
+        ours = [(f"ours, {name}", drawn, one) for name, one in seen.items()]
         panels.append(Panel(*axes, marks, ours))
     return Outcome(findings, panels)
 
@@ -185,9 +183,8 @@ def opposite() -> Outcome:
         two = replace(one, young_2=one.young, radius_2=one.radius)
         seen = []
         for spin in before:
-            balls = [
-                Ball(0.1, two.density, (0, 0, s * -0.2), (0, s * spin, 0)) for s in (1.0, -1.0)
-            ]
+            moves = [((0, 0, -0.2 * s), (0, s * spin, 0)) for s in (1.0, -1.0)]
+            balls = [Ball(0.1, two.density, *one) for one in moves]
             seen.append(head_on(*balls, *two.laws(0.4)))
         spins = np.array([one.spins[0, 1] for one in seen])
         slip = np.abs([one.velocities[0, 0] for one in seen] - data["tangential"]).max()

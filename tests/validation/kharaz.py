@@ -83,9 +83,8 @@ def measured() -> Outcome:
 
 def _own_error(data: Data) -> float:
     """Return by how much measured spins contradict measured velocities, over the largest."""
-    velocity, spin = (
-        data.where("quantity", one).where("reading", "kratos") for one in ("restitution", "spin")
-    )
+    mine = data.where("reading", "kratos")
+    velocity, spin = (mine.where("quantity", one) for one in ("restitution", "spin"))
     ratio = np.interp(spin["angle"], velocity["angle"], velocity["value"])
     along = SPEED * np.sin(np.radians(spin["angle"]))
     error = rms(2.5 * (1 - ratio) * along / GLASS.radius - spin["value"])

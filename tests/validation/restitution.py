@@ -41,9 +41,8 @@ def bounce(mass: float, law: sp.HuntCrossleyLaw, speed: float) -> float:
     scene = models.on_shell(models.slider(0.0, mass), plane(1.0), law, radius=RADIUS)
     undamped = sp.ImpactLaw(law.stiffness, law.exponent)
     touching = undamped.contact_time(undamped.depth_of(0.5 * mass * speed**2), speed)
-    result = sp.Simulation(scene, sp.Adaptive(1e-10)).run(
-        [RADIUS + GAP], [-speed], GAP / speed + 4 * touching
-    )
+    simulation, duration = sp.Simulation(scene, sp.Adaptive(1e-10)), GAP / speed + 4 * touching
+    result = simulation.run([RADIUS + GAP], [-speed], duration)
     assert [event.kind for event in result.events] == ["touch", "lift_off"]
     return float(result.v[-1, 0]) / speed
 

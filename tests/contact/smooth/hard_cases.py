@@ -93,7 +93,6 @@ if __name__ == "__main__":
     rows = table()
     print("\n".join(f"| {' | '.join(row)} |" for row in rows))
     text = "Spheres of radius r. Each row is a test; an open one is expected to fail, and says why."
-    cases = Measured(
-        "Contacts of curved elements", text, table=[("case", "what is right", ""), *rows]
-    )
+    head = "case", "what is right", ""
+    cases = Measured("Contacts of curved elements", text, table=[head, *rows])
     print(write("contact_cases", "python -m tests.contact.smooth.hard_cases", [cases]))

@@ -36,9 +36,8 @@ def about(axis, center, angles):
 def sweep(shell, path):
     """Pairs of centres WIDTH apart where the force may jump: wherever the features change, and,
     lest it jump where they do not, in the step of the path over which it changes most."""
-    pairs = [
-        pair for ends in pairwise(path) for pair in borders(partial(query, shell), *ends, WIDTH)
-    ]
+    find = partial(query, shell)
+    pairs = [pair for ends in pairwise(path) for pair in borders(find, *ends, WIDTH)]
 
     def force(center):
         return force_sum(query(shell, center))

@@ -148,11 +148,8 @@ def over_vertex(shell, depth: float):
             yield np.array([lowered(shell, center, depth) for center in path])
 
 
-STARS = [
-    one
-    for one in product(("tip", "pit", "saddle"), (3, 4, 6, 12), (2, 10, 40))
-    if one[:2] != ("saddle", 3)
-]
+EVERY_STAR = product(("tip", "pit", "saddle"), (3, 4, 6, 12), (2, 10, 40))
+STARS = [one for one in EVERY_STAR if one[:2] != ("saddle", 3)]
 SOME_STARS = {("tip", 3, 10), ("tip", 12, 40), ("pit", 6, 2), ("pit", 12, 40)}
 SOME_STARS |= {("saddle", 4, 2), ("saddle", 6, 40)}
 STARS = mostly_studies(STARS, SOME_STARS.__contains__)
