@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import gc
+import inspect
 import math
 import pickle
 import random
@@ -295,10 +296,7 @@ def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
 
 def test_a_scenario_names_functions_which_looking_does_not_execute(tmp_path) -> None:
     code = f"import math\nopen({str(tmp_path / 'ran')!r}, 'a').close()\n"
-    code += "def force(d, r, p):\n    return p[0] * d * math.sqrt(d) * (1 - p[1] * r)\n"
-    code += "def size(s, n, p):\n    x = min(s / p[1], 1.0)\n"
-    code += "    return p[0] * n * x * (3 - x * x) / 2\n"
-    (tmp_path / "own.py").write_text(code)
+    (tmp_path / "own.py").write_text(code + inspect.getsource(force) + inspect.getsource(size))
     text = DROP.replace(LAW_LINE, f"{LAW}\n{FRICTION}")
     path = write(tmp_path, text)
     with pytest.warns(errors.SlowLawWarning):
