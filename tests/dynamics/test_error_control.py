@@ -272,15 +272,10 @@ def test_a_step_ends_at_each_event(kind, law: str) -> None:
 
 def test_the_first_of_several_events_ends_the_step() -> None:
     """Two spheres of one body over a plate touch one after the other."""
-    model = models.slider()
-    scene = sp.Scene(model)
-    for name, low in (("low", 0.0), ("high", 3e-6)):
-        scene.add_contact(
-            sp.Sphere(R, "ball", (0.2 * (name == "low"), 0.0, low)),
-            models.plate(),
-            law=LAWS["linear"],
-            name=name,
-        )
+    scene = sp.Scene(models.slider())
+    for name, place in (("low", (0.2, 0.0, 0.0)), ("high", (0.0, 0.0, 3e-6))):
+        sphere = sp.Sphere(R, "ball", place)
+        scene.add_contact(sphere, models.plate(), law=LAWS["linear"], name=name)
     result = sp.Simulation(scene, sp.Adaptive(1e-5)).run([R + DROP], None, 0.15)
     first = [(event.pair, event.t) for event in result.events if event.kind == "touch"][:2]
     assert [pair for pair, _ in first] == ["low", "high"]

@@ -195,12 +195,9 @@ def test_what_a_joint_adds_is_transmitted():
     link, rotor, damping, friction, joint = 0.3, 0.2, 0.4, 1.5, "wheel_joint"
     inertia = pin.Inertia(1.0, np.zeros(3), np.diag([0.1, 0.1, link]))
     models.add_body(model, "wheel", pin.JointModelRZ(), inertia=inertia)
-    joints = sp.JointComponents(
-        damping={joint: damping},
-        friction={joint: sp.JointFriction(friction)},
-        armature={joint: rotor},
-        effort={joint: 4.0},
-    )
+    parts = {"damping": damping, "armature": rotor, "effort": 4.0}
+    parts |= {"friction": sp.JointFriction(friction)}
+    joints = sp.JointComponents(**{kind: {joint: one} for kind, one in parts.items()})
     torque = sp.JointTorqueSensor(name="torque", joint=joint, rate=200)
     sensors = [torque, sensor(joint, rate=200)]
     simulation = sp.Simulation(sp.Scene(model, joints=joints), sp.Adaptive(rtol=1e-9), sensors)

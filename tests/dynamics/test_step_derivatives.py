@@ -69,15 +69,9 @@ def assert_step(scene, integrator, q, v):
         moved, scale, ahead = moves[name]
         # At its bound, 0, a number is differenced to one side.
         bound = 1e-5 if ahead else 1e-6
-        error = differences.off(
-            column[part * nv : (part + 1) * nv],
-            lambda x, moved=moved, part=part: after(*moved(x))[part],
-            scale,
-            floor=floor,
-            tolerance=bound,
-            known=float(known[part]),
-            ahead=ahead,
-        )
+        limits = {"floor": floor, "tolerance": bound, "known": float(known[part]), "ahead": ahead}
+        f = lambda x, moved=moved, part=part: after(*moved(x))[part]  # noqa: E731
+        error = differences.off(np.split(column, 2)[part], f, scale, **limits)
         if not error <= bound:
             wrong[f"{'qv'[part]} by {name}"] = error
     assert not wrong

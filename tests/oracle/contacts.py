@@ -87,14 +87,8 @@ def _touch(center, point, elements, *, sure, depth, group=0, normal=None) -> Tou
     away = center - point
     if normal is None:  # undefined, here zero, where the center lies on the surface
         normal = away / norm(away) if norm(away) > 0 else away
-    return Touch(
-        np.asarray(point, dtype=float),
-        np.asarray(normal, dtype=float),
-        float(depth),
-        frozenset(int(e) for e in elements),
-        sure,
-        group,
-    )
+    point, normal = (np.asarray(one, dtype=float) for one in (point, normal))
+    return Touch(point, normal, float(depth), frozenset(map(int, elements)), sure, group)
 
 
 def facets(
