@@ -14,7 +14,8 @@ from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
-from tests.contact.smooth.test_real_surfaces import faults, jump
+from tests.contact.smooth.test_real_surfaces import faults
+from tests.contact.walks import jump
 
 UP = np.array([0.0, 0.0, 1.0])
 

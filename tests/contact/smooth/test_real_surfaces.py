@@ -18,9 +18,9 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.contact_set import ContactSet, Feature
 from sphshell_pin.shell.curvature import points_at
 from sphshell_pin.shell.raw import random_places
-from tests.contact.helpers import directions, energy, force_sum
+from tests.contact.helpers import directions, energy
 from tests.contact.smooth.surfaces import mean_edge
-from tests.contact.walks import narrowed
+from tests.contact.walks import change, jump, narrowed
 from tests.shell import test_corpus as corpus
 
 COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
@@ -153,19 +153,6 @@ def test_nothing_is_missed(name: str) -> None:
     deepest = np.array([found.depth.max(initial=0.0) for found in answers(name)])
     missed = (some.reach - deepest) / some.radii
     assert not {int(i): float(missed[i]) for i in np.flatnonzero(~(missed <= 1e-6))}
-
-
-def change(before: ContactSet, after: ContactSet, move: Array) -> tuple[float, float, float]:
-    """Potential that the forces do not account for, potential, and largest force times move."""
-    v0, v1, f0, f1 = energy(before), energy(after), force_sum(before), force_sum(after)
-    size = max(sum(c.terms.depth**1.5) for c in (before, after))
-    return abs(v1 - v0 + (f0 + f1) @ move / 2), max(v0, v1), size * float(np.linalg.norm(move))
-
-
-def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
-    """Jump of the potential between two centres that are near each other, as a share of it."""
-    lost, potential, most = change(before, after, move)
-    return max(lost - most, 0.0) / potential if potential > 0 else 0.0
 
 
 def steepest_between(find, start, end, width):
