@@ -9,7 +9,6 @@ from sphshell_pin.errors import ResultError
 from tests import meshes
 from tests.oracle.hertz import hertz_contact
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider
-from tests.results import damaged
 
 
 def pressing(shell, law=LAW):
@@ -43,16 +42,6 @@ def test_other_numbers_are_the_same_without_patches():
     assert not_asked.patch_rows is None
     with pytest.raises(ResultError, match=r"record=\('patch',\)"):
         not_asked.patches  # noqa: B018
-
-
-def test_files_keep_them_and_are_refused_with_too_few(tmp_path):
-    result = slide()
-    file = result.save(tmp_path / "run.npz")
-    again = sp.Result.load(file)
-    assert (again.patches == result.patches).all()
-    assert again.contact_columns()["peak_pressure [Pa]"][7] == result.patches["peak_pressure"][7]
-    with pytest.raises(ResultError, match=r"'patches\.approach' has the shape \(50,\)"):
-        sp.Result.load(damaged(file, "patches.approach", lambda rows: rows[:-1]))
 
 
 def test_open_runs_and_rollouts_record_them():
