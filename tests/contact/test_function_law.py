@@ -153,12 +153,9 @@ def test_derivatives_are_those_of_the_twin(own, twin, moves) -> None:
     ],
 )
 def test_a_run_is_that_of_the_twin_and_keeps_its_energy(own, twin, error) -> None:
-    ours, theirs = (
-        sp.Simulation(models.on_plate(models.ball(), *one), sp.Adaptive(1e-10)).run(
-            BALL, MOVES, 0.2, record_dt=1e-3
-        )
-        for one in (own, twin)
-    )
+    scenes = (models.on_plate(models.ball(), *one) for one in (own, twin))
+    given = sp.Adaptive(1e-10), BALL, MOVES, 0.2
+    ours, theirs = (models.run(scene, *given, record_dt=1e-3) for scene in scenes)
     np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=error)
     assert np.abs(ours.energy.residual).max() < 1e-8
     assert (ours.energy.friction_loss[-1] > 1e-4) == (own[1] is not None)

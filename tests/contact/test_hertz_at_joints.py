@@ -81,12 +81,9 @@ def button(sides: int = 32, across: int = 16) -> sp.Shell:
 def test_the_force_is_continuous_beside_a_joint_that_bulges_beyond_its_chords() -> None:
     one, places = scene(shell=button()), np.linspace(-1.2, 1.2, 401) * LENGTH
     reach = BEND + RADIUS - DEPTH
-    centers = [
-        np.array([HALF + reach * np.sin(a), 0.0, reach * np.cos(a) - BEND])
-        if a > 0
-        else np.array([HALF + a * BEND, 0.0, RADIUS - DEPTH])
-        for a in places / BEND
-    ]
+    flat, bent = np.minimum(places, 0.0), np.maximum(places, 0.0) / BEND
+    across, height = HALF + flat + reach * np.sin(bent), reach * np.cos(bent) - BEND
+    centers = np.stack([across, 0 * across, height], axis=1)
     forces = np.array([force(one, at) for at in centers])
     size = np.linalg.norm(forces, axis=1)
     assert np.abs(np.diff(forces, axis=0)).max() < 3e-3 * size.max()

@@ -70,11 +70,8 @@ def settle_all(integrator: Any, gravity: float, start: float) -> Verdict:
 @case("balls of 1 mg to 100 kg on springs of 1e3 to 1e9 N/m")
 def stiffness_and_mass() -> Verdicts:
     stiff = (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3))
-    yield from [
-        settle_all(integrator, gravity, start)
-        for integrator in stiff
-        for gravity, start in ((GRAVITY, 0.0), (GRAVITY, 0.9), (1e3 * GRAVITY, 0.9))
-    ]
+    for integrator, start in product(stiff, ((GRAVITY, 0.0), (GRAVITY, 0.9), (1e3 * GRAVITY, 0.9))):
+        yield settle_all(integrator, *start)
 
 
 def stacked_depths(upper: float, lower: float, integrator: Any) -> tuple[list[float], list[float]]:

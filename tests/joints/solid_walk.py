@@ -38,12 +38,8 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> tuple[Array, Array]
     Their centers (n, 3) and radii (n,) [mm].
     """
     centers, radii = [], []
-    sides = [
-        (edge, k)
-        for edge in solid.edges
-        for k in range(len(edge.faces))
-        if all(solid.surfaces[f].kind for f in edge.faces)
-    ]
+    known = [edge for edge in solid.edges if all(solid.surfaces[f].kind for f in edge.faces)]
+    sides = [(edge, k) for edge in known for k in range(len(edge.faces))]
     sides += [(Edge(curve, 0.0, [row], [True], (0, 0)), 0) for row, curve in solid.seams]
     per = -(-count // max(len(sides), 1))
     for edge, k in sides:

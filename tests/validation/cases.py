@@ -26,19 +26,8 @@ from tests.register import Register
 from tests.validation.pictures import Panel, Series
 
 MODULES = (
-    "kharaz",
-    "chung_ooi",
-    "pressed",
-    "ellipses",
-    "finger_pad",
-    "cam",
-    "rolling",
-    "restitution",
-    "leaving",
-    "carried",
-    "tippe_top",
-    "rattleback",
-    "tosses",
+    *("kharaz", "chung_ooi", "pressed", "ellipses", "finger_pad", "cam", "rolling"),
+    *("restitution", "leaving", "carried", "tippe_top", "rattleback", "tosses"),
 )
 """In the order of the page."""
 Sense = Literal["<=", ">="]

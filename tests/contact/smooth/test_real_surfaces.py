@@ -162,13 +162,10 @@ def steepest_between(find, start, end, width):
     def lost(before: tuple[ContactSet, Array], after: tuple[ContactSet, Array]) -> float:
         return change(before[0], after[0], after[1] - before[1])[0]
 
-    return narrowed(
-        lambda center: (find(center), center),
-        start,
-        end,
-        width,
-        lambda first, here, last: lost(first, here) > lost(here, last),
-    )[:2]
+    def goes_left(first, here, last):
+        return lost(first, here) > lost(here, last)
+
+    return narrowed(lambda center: (find(center), center), start, end, width, goes_left)[:2]
 
 
 def beside(some: Spheres):
