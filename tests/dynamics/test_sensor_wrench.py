@@ -43,21 +43,14 @@ def sensor(frame="mount", **more):
     return sp.ForceTorqueSensor(name="wrist", frame=frame, **more)
 
 
-def poses(model, q):
-    data = model.createData()
-    pin.framesForwardKinematics(model, data, q)
-    return {f.name: data.oMf[k] for k, f in enumerate(model.frames)}
-
-
 def weight(model, q, at="mount", parts=BEYOND):
     """Force and torque that carry the weight of the parts, in the frame `at`."""
-    pose = poses(model, q)
     total = pin.Force.Zero()
     for name in parts:
         mass, com, _ = PARTS[name]
-        up, arm = np.array([0.0, 0.0, 9.81 * mass]), pose[name] * np.array(com)
+        up, arm = np.array([0.0, 0.0, 9.81 * mass]), models.pose_of(model, q, name) * np.array(com)
         total += pin.Force(up, np.cross(arm, up))
-    return pose[at].actInv(total).vector
+    return models.pose_of(model, q, at).actInv(total).vector
 
 
 def read(scene, q, controller, sensors, duration=0.0, **more):
@@ -88,7 +81,7 @@ def test_at_rest_it_reads_the_weight_beyond_it(frame, lock):
 def test_a_contact_on_the_frame_of_a_locked_joint_is_beyond_the_sensor():
     """As that of a sphere on the link there, which is at the same place."""
     model, q, law = arm(), np.array([0.4, -0.7]), sp.ImpactLaw(1e6, 1.5)
-    center = poses(model, q)["finger"].translation
+    center = models.pose_of(model, q, "finger").translation
     plane = pin.SE3(np.eye(3), center - [0.01, 0.02, 0.02 - 3e-4])
     read_by = {}
     for one in (None, "knuckle", "finger"):
@@ -106,7 +99,7 @@ def test_a_contact_on_the_frame_of_a_locked_joint_is_beyond_the_sensor():
 def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     model, radius, depth = arm(), 0.02, 3e-4
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, model.nq)
-    center = poses(model, q)["tip"].translation
+    center = models.pose_of(model, q, "tip").translation
     law, scene = sp.ImpactLaw(1e6, 1.5), sp.Scene(model)
     place = pin.SE3(np.eye(3), center - [0.01, 0.02, radius - depth])
     scene.add_contact(sp.Sphere(radius, "tip"), models.plate(), placement=place, law=law)
@@ -115,7 +108,7 @@ def test_a_pressed_tip_reads_the_opposite_of_the_contact_force(seed):
     switch = sp.ContactSwitch(name="switch", frame="finger", threshold=1.0)
     tool = sp.ForceTorqueSensor(name="tool", frame="grip")
     result = read(scene, q, lambda t, q, v, contacts: hold, [sensor(), tool, switch])
-    pose = poses(model, q)["mount"]
+    pose = models.pose_of(model, q, "mount")
     push = np.array([0.0, 0.0, law.normal_force(depth)])
     arm_of_force = center - [0, 0, radius] - pose.translation
     contact = np.ravel([pose.rotation.T @ one for one in (push, np.cross(arm_of_force, push))])
@@ -133,9 +126,8 @@ def test_a_swinging_link_needs_centripetal_and_angular_acceleration(integrator):
     """What a joint in place of the mount, which rests, would transmit; the knuckle is locked."""
     rate, model = 250.0, arm()
     scene = sp.Scene(model, lock=["knuckle"])
-    result = sp.Simulation(scene, integrator, [sensor(rate=rate)]).run(
-        [0.9], [4.0], 0.4, record_dt=1 / rate
-    )
+    simulation = sp.Simulation(scene, integrator, [sensor(rate=rate)])
+    result = simulation.run([0.9], [4.0], 0.4, record_dt=1 / rate)
     log = result.sensors["wrist"]
     assert np.allclose(log.t, result.t, rtol=0, atol=1e-12)
     whole = pin.buildModelFromXML(URDF.replace('"mount" type="fixed"', '"mount" type="revolute"'))

@@ -7,6 +7,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import minimize
 
 import sphshell_pin as sp
 from sphshell_pin import testing
@@ -110,21 +111,10 @@ def test_the_force_is_the_gradient_of_a_potential(name: str) -> None:
 
 
 def enclosing(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Middle and radius of the smallest circle round points, by trial of all pairs and triples."""
-    best = (points[0], np.inf)
-    for a in range(len(points)):
-        for b in range(a):
-            middles = [(points[a] + points[b]) / 2]
-            for c in range(b):
-                sides = np.array([points[a] - points[c], points[b] - points[c]])
-                if abs(np.linalg.det(sides)) > 1e-12:
-                    squares = (sides**2).sum(axis=1) / 2
-                    middles.append(points[c] + np.linalg.solve(sides, squares))
-            for middle in middles:
-                radius = np.linalg.norm(points - middle, axis=1).max()
-                if radius < best[1]:
-                    best = middle, radius
-    return best
+    """Middle and radius of the smallest circle round points."""
+    reach = lambda middle: np.linalg.norm(points - middle, axis=1).max()  # noqa: E731
+    found = minimize(reach, points.mean(axis=0), method="Nelder-Mead", tol=1e-9)
+    return found.x, found.fun
 
 
 @pytest.mark.parametrize("corners", [3, 4, 5, 8])
