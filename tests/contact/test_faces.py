@@ -119,14 +119,13 @@ def test_vertices_of_few_digits_count_as_on_their_faces(step, tmp_path):
 @pytest.mark.parametrize("made", ["file", "mesh", "single precision"])
 def test_a_ball_in_a_bore_touches_once(made, share, step):
     """The file's bore, or one whose vertices alone tell what it is."""
-    known = 2e-8 if made == "single precision" else 1e-9
+    known, kind = (2e-8, np.float32) if made == "single precision" else (1e-9, float)
+    size, axis, middle = 5e-3, [0.0, 0.0], 0.0
     if made == "file":
-        shell, size, axis, middle = sp.Shell.from_file(step), 5e-3, [15e-3, 20e-3], 8e-3
+        shell, axis, middle = sp.Shell.from_file(step), [15e-3, 20e-3], 8e-3
     else:
-        solid = sp.Shell.from_geometry(coal.Cylinder(5e-3, 40e-3))
-        vertices = np.float32(solid.vertices) if made == "single precision" else solid.vertices
-        shell = sp.Shell(vertices, solid.elements)
-        size, axis, middle = 5e-3, [0.0, 0.0], 0.0
+        solid = sp.Shell.from_geometry(coal.Cylinder(size, 40e-3))
+        shell = sp.Shell(solid.vertices.astype(kind), solid.elements)
     radius = share * size
     for turn in np.random.default_rng(0).uniform(0, 2 * np.pi, 20):
         aside = (size - radius + 0.01 * radius) * np.array([np.cos(turn), np.sin(turn)])

@@ -10,36 +10,28 @@ from sphshell_pin import Shell
 from sphshell_pin.shell.raw import random_places
 from tests import meshes
 from tests.contact.helpers import directions
-from tests.contact.smooth.parts import (
-    Part,
-    averaged_normals,
-    distance_to_fillet,
-    extruded,
-    fillet,
-    random_extruded,
-    random_turned,
-)
+from tests.contact.smooth import parts
 from tests.contact.smooth.surfaces import SURFACES, mean_edge
 
 COUNT = 50  # of each family
 
 
 @pytest.mark.parametrize("averaged", [False, True])
-@pytest.mark.parametrize("make", [random_turned, random_extruded])
+@pytest.mark.parametrize("make", [parts.random_turned, parts.random_extruded])
 def test_random_parts(make, averaged: bool) -> None:
     """Kinks of 3 to 29 degrees between stretches of 0.2 to 20 radii. A few polygons may turn as
     evenly as a sampled curve does. The normals of a file bear witness no more than the elements."""
-    parts = [make(seed) for seed in range(COUNT)]
-    normals = [averaged_normals(p.vertices, p.elements) if averaged else None for p in parts]
-    worse = [seed for seed in range(COUNT) if parts[seed].is_worse_than_flat(normals[seed])]
+    some = [make(seed) for seed in range(COUNT)]
+    normals = [parts.averaged_normals(p.vertices, p.elements) if averaged else None for p in some]
+    worse = [seed for seed in range(COUNT) if some[seed].is_worse_than_flat(normals[seed])]
     assert len(worse) <= 0.02 * COUNT, worse
 
 
-def fillet_part(chords: int, turn: float, wall: float, rows: int) -> Part:
+def fillet_part(chords: int, turn: float, wall: float, rows: int) -> parts.Part:
     rng = np.random.default_rng(chords)
-    part = extruded(fillet(chords, turn, wall), 3.0, rows, rng)
-    exact = distance_to_fillet(part.places[:, :2], turn, wall)
-    return Part(part.vertices, part.elements, part.places, exact)
+    part = parts.extruded(parts.fillet(chords, turn, wall), 3.0, rows, rng)
+    exact = parts.distance_to_fillet(part.places[:, :2], turn, wall)
+    return parts.Part(part.vertices, part.elements, part.places, exact)
 
 
 @pytest.mark.parametrize("wall", [3.0, 20.0])
@@ -57,8 +49,8 @@ def test_fillets(wall: float, rows: int) -> None:
 @pytest.mark.parametrize("rows", [1, 3])
 def test_chamfers_stay_flat(wall: float, rows: int) -> None:
     for degrees in (10, 30, 50):
-        section = fillet(1, np.radians(degrees), wall)
-        part = extruded(section, 3.0, rows, np.random.default_rng(degrees))
+        section = parts.fillet(1, np.radians(degrees), wall)
+        part = parts.extruded(section, 3.0, rows, np.random.default_rng(degrees))
         assert part.errors()[0] <= 1e-12
 
 
@@ -79,7 +71,7 @@ def test_smooth_shaded_solids(name: str, points) -> None:
     """Normals that were averaged over the edges are set aside, and the report counts them."""
     hull = trimesh.convex.convex_hull(points)
     vertices, elements = np.array(hull.vertices), np.array(hull.faces)
-    shell = Shell(vertices, elements, normals=averaged_normals(vertices, elements))
+    shell = Shell(vertices, elements, normals=parts.averaged_normals(vertices, elements))
     size = np.linalg.norm(np.ptp(vertices, axis=0))
     rng = np.random.default_rng(0)
     low, high = vertices.min(axis=0) - 0.3 * size, vertices.max(axis=0) + 0.3 * size

@@ -9,15 +9,7 @@ from sphshell_pin import Shell
 from sphshell_pin.shell.curvature import curved_mesh
 from tests import meshes
 from tests.contact.helpers import directions, energy, force_sum
-from tests.contact.smooth.hard_cases import (
-    DEPTH,
-    UP,
-    assert_no_jump,
-    fails,
-    find,
-    graph,
-    stored,
-)
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, graph, stored
 from tests.contact.smooth.surfaces import cylinder_mesh, given
 from tests.oracle.pieces import potential_and_force
 
