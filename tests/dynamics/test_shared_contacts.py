@@ -1,7 +1,7 @@
 """Flat faces and lines beside a plane under laws of a point: potential, derivatives, rest."""
 
-import itertools
 import warnings
+from itertools import product
 
 import coal
 import numpy as np
@@ -95,18 +95,15 @@ def test_the_force_is_the_gradient_of_a_potential(name: str) -> None:
         model = scene.model
         ways = rng.normal(size=(2, 6)) * np.r_[[1e-5] * 3, [tilt / CROWN] * 3]
         turns, weights = np.polynomial.legendre.leggauss(12)
-        parts = np.linspace(0, 2 * np.pi, 61)
+        angles = np.add.outer(np.pi / 30 * (np.arange(60) + 0.5), np.pi / 60 * turns)
         total = size = 0.0
-        for begin, end in itertools.pairwise(parts):
-            for x, share in zip(turns, weights, strict=True):
-                angle = (begin + end) / 2 + (end - begin) / 2 * x
-                at = np.cos(angle) * ways[0] + np.sin(angle) * ways[1]
-                along = -np.sin(angle) * ways[0] + np.cos(angle) * ways[1]
-                here = pin.integrate(model, q, at)
-                rate = pin.dIntegrate(model, q, at)[1] @ along
-                force = scene.external_forces(here, np.zeros(6))[1].vector
-                total += share * (end - begin) / 2 * force @ rate
-                size += share * (end - begin) / 2 * abs(force @ rate)
+        for angle, share in zip(angles.ravel(), np.tile(weights, 60), strict=True):
+            at = np.cos(angle) * ways[0] + np.sin(angle) * ways[1]
+            along = -np.sin(angle) * ways[0] + np.cos(angle) * ways[1]
+            rate = pin.dIntegrate(model, q, at)[1] @ along
+            here = pin.integrate(model, q, at)
+            power = share * scene.external_forces(here, np.zeros(6))[1].vector @ rate
+            total, size = total + power, size + abs(power)
         assert abs(total) < 1e-5 * size  # kinks within the rule
 
 
@@ -167,19 +164,29 @@ SOLIDS = {
 }
 
 
-INTEGRATORS = [sp.Adaptive(1e-7, 1e-10), sp.Implicit(1e-7, 1e-10), sp.RungeKutta4(5e-5)]
-FALLS = [("box", one, friction) for one in INTEGRATORS for friction in planes.FRICTIONS[1:]]
-FALLS += [(name, one, planes.FRICTIONS[1]) for name in ("coin", "cone") for one in INTEGRATORS]
+LAYER = sp.FoundationLaw(1e5, 1e-3, 10.0)
+SLIPS = [planes.FRICTIONS[1], sp.BristleFriction(0.4, 0.4, 1e4, 30.0)]
 
 
-@pytest.mark.parametrize(("name", "integrator", "friction"), FALLS)
-def test_solids_come_to_rest_at_an_ordinary_cost(name: str, integrator, friction) -> None:
+def steppers(rtol: float) -> list:
+    return [sp.Adaptive(rtol, 1e-3 * rtol), sp.Implicit(rtol, 1e-3 * rtol), sp.RungeKutta4(5e-5)]
+
+
+FALLS = [("box", LAW, *one) for one in product(steppers(1e-7), SLIPS)]
+FALLS += [("box", LAYER, *one) for one in product(steppers(1e-6), SLIPS)]
+FALLS += [(name, LAW, one, SLIPS[0]) for name in ("coin", "cone") for one in steppers(1e-7)]
+
+
+@pytest.mark.parametrize(("name", "law", "integrator", "friction"), FALLS)
+def test_solids_come_to_rest_at_an_ordinary_cost(name: str, law, integrator, friction) -> None:
     """They fall, rattle, and lie still; the energies close."""
     make, inertia, turn, v = SOLIDS[name]
     duration = 1.0 if name == "box" else 0.5
     more = {"v": v, "turn": turn, "duration": duration, "record_dt": 1e-3}
-    result = planes.fallen(make, inertia, LAW, friction, integrator, **more)
-    planes.assert_at_rest(result, 20_000 * duration)
+    result = planes.fallen(make, inertia, law, friction, integrator, **more)
+    assert result.stats.steps <= 20_000 * duration
+    assert np.abs(result.v[-1]).max() < 1e-6
+    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
 
 
 @pytest.mark.parametrize("friction", [None, sp.CoulombFriction(0.4, 0.4, 0.01, 0.1)])
