@@ -61,9 +61,8 @@ def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
     start = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
 
     def end(name: str, **more) -> np.ndarray:
-        pressing = sp.CartesianImpedance(
-            name, PATH, 100.0, 10.0, 1.0, shell, rotational_stiffness=2.0, **more
-        )
+        more |= {"rotational_stiffness": 2.0}
+        pressing = sp.CartesianImpedance(name, PATH, 100.0, 10.0, 1.0, shell, **more)
         return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(start, None, 0.1, pressing).q[-1]
 
     np.testing.assert_array_equal(end(frame.name, offset=offset), end("beside"))

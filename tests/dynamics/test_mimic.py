@@ -159,13 +159,11 @@ def random_tree(rng: np.random.Generator) -> Tree:
         free.appendBodyToJoint(joint, inertia, body)
         free.addFrame(pin.Frame(f"tip{j}", joint, pin.SE3.Random(), pin.FrameType.OP_FRAME))
     order = rng.permutation(n) + 1
-    rules = [
-        Mimic(
-            f"j{one}", f"j{rng.choice(order[:k])}", rng.uniform(0.3, 2) * rng.choice([-1, 1]), 0.1
-        )
-        for k, one in enumerate(order)
-        if k and rng.random() < 0.5
-    ]
+    rules = []
+    for k, one in enumerate(order[1:], 1):
+        if rng.random() < 0.5:
+            followed, ratio = rng.choice(order[:k]), rng.uniform(0.3, 2) * rng.choice([-1, 1])
+            rules.append(Mimic(f"j{one}", f"j{followed}", ratio, 0.1))
     return Tree(free, with_mimics(free, rules))
 
 

@@ -152,9 +152,8 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     v = np.array([0.02, -0.03, 0.05 if parts else -0.5, 0.3, 0.2, 1.0])
     ends = []
     for steps in (40, 80, 160) if order == 1 else (20, 40, 80):
-        run = sp.Simulation(scene, integrator(0.006 / steps)).run(
-            models.free_q([0, 0, 0.05 - depth]), v, 0.006, record_dt=0.006 / steps
-        )
+        step, q = integrator(0.006 / steps), models.free_q([0, 0, 0.05 - depth])
+        run = sp.Simulation(scene, step).run(q, v, 0.006, record_dt=step.dt)
         heights = np.diff(run.q[:, 2])
         assert (heights > 0).all() if parts else (heights < 0).all()
         assert run.contacts.friction_force_world[-1, :2].any()
@@ -246,12 +245,10 @@ def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:
     angle = math.radians(degrees)
     scene = over_a_groove(angle, friction)
     height = 0.1 / math.cos(angle) + 0.02 * math.tan(angle) - 5e-4
+    q, v = models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0]
     jumps = []
     for record_dt in (2e-4, 2.5e-5):
-        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-            models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0], 0.1,
-            record_dt=record_dt,
-        )  # fmt: skip
+        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q, v, 0.1, record_dt=record_dt)
         assert np.bincount(run.contacts.row).max() > 1
         force = np.zeros((len(run.t), 3))
         np.add.at(force, run.contacts.row, run.contacts.friction_force_world)

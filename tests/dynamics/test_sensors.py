@@ -75,9 +75,8 @@ def test_the_filter_misses_no_impact():
 def test_sensors_do_not_change_the_motion(integrator):
     friction = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
     scene = models.on_plate(models.arm(), sp.HuntCrossleyLaw(1e6, 1.5, 0.2), friction)
-    controller = sp.CartesianImpedance(
-        frame="ball", path=[(0.3, 0.1, 0.04), (0.35, 0.1, 0.04)], stiffness=900, damping=30
-    )
+    path = [(0.3, 0.1, 0.04), (0.35, 0.1, 0.04)]
+    controller = sp.CartesianImpedance("ball", path, 900.0, 30.0)
     sensors = [
         sp.ForceTorqueSensor(name="a", frame="two_joint", rate=700, cutoff=100, delay=1e-3),
         sp.ForceTorqueSensor(name="b", frame=BALL, rate=331, force_noise=1.0),

@@ -118,9 +118,8 @@ def test_more_contacts_begin_at_once_than_there_is_room_for(integrator) -> None:
     model, law = models.ball(), sp.HuntCrossleyLaw(1e5, 1.5, 5.0)
     model.gravity.linear = np.array([9.81 * np.sin(0.3), 0.0, -9.81 * np.cos(0.3)])
     scene = scene_of(pad(lift=0.0), together=True, model=model, law=law)
-    result = sp.Simulation(scene, integrator).run(
-        models.free_q([0, 0, R + 1e-4]), np.zeros(6), 0.4, record_dt=0.1
-    )
+    q = models.free_q([0, 0, R + 1e-4])
+    result = models.run(scene, integrator, q, duration=0.4, record_dt=0.1)
     assert [figures.touches > 0 for figures in result.stats.pairs.values()] == [True] * 64
     assert np.abs(result.v[-1]).max() < 1e-3
     assert abs(result.q[-1, 0] - result.q[-2, 0]) < 1e-6

@@ -19,12 +19,10 @@ def run(shell=None, duration=0.05, q0=(-0.005, 0.0, RADIUS - DEPTH), method=None
     model = slider(mass=1e4)
     model.gravity.linear[:] = 0.0
     scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(RADIUS, "ball"), shell or plate(), law=LAW, name="tip", method=method
-    )
-    return sp.Simulation(scene, sp.Adaptive()).run(
-        q0, [0.2, 0.0, 0.0], duration, record_dt=1e-3, record=("patch",)
-    )
+    pair = sp.Sphere(RADIUS, "ball"), shell or plate()
+    scene.add_contact(*pair, law=LAW, name="tip", method=method)
+    simulation, rows = sp.Simulation(scene, sp.Adaptive()), {"record_dt": 1e-3}
+    return simulation.run(q0, [0.2, 0.0, 0.0], duration, record=("patch",), **rows)
 
 
 @pytest.fixture(scope="module")

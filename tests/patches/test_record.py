@@ -24,9 +24,8 @@ def test_a_ball_on_a_plane_has_the_patch_of_hertz():
     # Johnson 4.2: a^2 = R depth, p0 = 3 N / (2 pi a^2).
     a = np.sqrt(RADIUS * log.depth)
     np.testing.assert_allclose(patches["half_axes"], np.stack([a, a], axis=1), rtol=1e-12)
-    np.testing.assert_allclose(
-        patches["peak_pressure"], 1.5 * log.normal_force / (np.pi * a * a), rtol=1e-12
-    )
+    peak = 1.5 * log.normal_force / (np.pi * a * a)
+    np.testing.assert_allclose(patches["peak_pressure"], peak, rtol=1e-12)
     np.testing.assert_allclose(patches["mean_pressure"] * 1.5, patches["peak_pressure"])
     np.testing.assert_allclose(patches["approach"], log.depth)
     assert np.abs((patches["axis_world"] * log.normal_world).sum(axis=1)).max() < 1e-15

@@ -51,12 +51,10 @@ def slid():
     ],
 )
 def test_forces_add_up(slid, grid):
-    images = grid.images(slid)
+    images, force = grid.images(slid), total_force(slid)
     assert images.forces.shape == (51, *grid.shape)
-    force = total_force(slid)
-    np.testing.assert_allclose(
-        images.forces.sum(axis=(1, 2)) + images.outside, force, rtol=1e-12, atol=0
-    )
+    found = images.forces.sum(axis=(1, 2)) + images.outside
+    np.testing.assert_allclose(found, force, rtol=1e-12, atol=0)
     # All of the patch is on these grids: the integrals themselves must add up.
     assert np.abs(images.outside).max() < 1e-12 * force.max()
     assert images.forces.min() > -1e-12 * force.max()
@@ -104,9 +102,8 @@ def test_both_of_two_spheres_feel_it():
     model.addFrame(pin.Frame("ground", 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     scene = sp.Scene(model)
     scene.add_contact(sp.Sphere(RADIUS, "ball"), sp.Sphere(0.02, "ground"), law=LAW, name="tip")
-    scene.add_contact(
-        sp.Sphere(0.02, "ground"), plate(height=lambda x, y: -0.03), law=LAW, name="below"
-    )
+    low = plate(height=lambda x, y: -0.03)
+    scene.add_contact(sp.Sphere(0.02, "ground"), low, law=LAW, name="below")
     q0 = [0.0, 0.0, 0.03 - pressed()]
     result = sp.Simulation(scene).run(q0, duration=1e-4, record=("patch",))
     own = np.asarray(result.contacts.pair) == 0
