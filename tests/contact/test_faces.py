@@ -172,10 +172,8 @@ def test_a_sphere_on_an_axis_touches_a_ring(place, step):
     force = law.normal_force(depth) * sine
     np.testing.assert_allclose(found.force(law), [0.0, 0.0, force], atol=1e-9 * abs(force))
     # It goes over continuously to that of the nearest point.
-    across = [
-        np.hypot(*touch(shell, center + [off * radius, 0, 0], radius).normal[0, :2])
-        for off in (1e-10, 3e-10, 5e-10, 1e-8)
-    ]
+    beside = [center + [off * radius, 0, 0] for off in (1e-10, 3e-10, 5e-10, 1e-8)]
+    across = [np.hypot(*touch(shell, one, radius).normal[0, :2]) for one in beside]
     assert 0 < across[0] < across[1] < across[2] < across[3]
     assert np.isclose(np.hypot(across[3], sine), 1, atol=1e-9)
 

@@ -46,9 +46,8 @@ class Surface:
         shape = getattr(self.adaptor, self.kind)()
         frame = shape.Position()
         self.point = np.array(frame.Location().Coord())
-        self.x, self.y, self.axis = (
-            np.array(one().Coord()) for one in (frame.XDirection, frame.YDirection, frame.Direction)
-        )
+        ways = frame.XDirection(), frame.YDirection(), frame.Direction()
+        self.x, self.y, self.axis = (np.array(way.Coord()) for way in ways)
         # The surface's own normal is du x dv.
         self.sense = 1.0 if frame.Direct() else -1.0
         if self.kind in ("Cylinder", "Sphere"):

@@ -81,10 +81,8 @@ def carried_balls() -> Outcome:
     runs = {angle: push_box(angle, duration) for angle, duration in DURATIONS.items()}
     slopes = np.array([accelerations(t, speeds) for t, speeds, _ in runs.values()])
     box, ball = np.abs(slopes / EXACT - 1).max(axis=0)
-    errors = [
-        float(np.sum((speeds - np.outer(t, EXACT)) ** 2 + across**2, axis=1).mean())
-        for t, speeds, across in (runs[90.0], runs[60.0])
-    ]
+    off = [(speeds - np.outer(t, EXACT), across) for t, speeds, across in (runs[90.0], runs[60.0])]
+    errors = [float(np.sum(one**2 + across**2, axis=1).mean()) for one, across in off]
     aside = max(float((across[-1] / speeds[-1]).max()) for _, speeds, across in runs.values())
     theirs = {name: data[name] for name in ("along y", "diagonal")}
     what = "four directions, acceleration relative to"

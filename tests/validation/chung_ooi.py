@@ -67,10 +67,8 @@ def restitution() -> Outcome:
     """Run test 3."""
     findings: list[Figure] = []
     ours, stated = [], (0.2, 0.4, 0.6, 0.8, 1.0)
-    for name, young, poisson, density in (
-        ("aluminum oxide", 3.8e11, 0.23, 4000.0),
-        ("cast iron", 1e11, 0.25, 7000.0),
-    ):
+    materials = ("aluminum oxide", 3.8e11, 0.23, 4000.0), ("cast iron", 1e11, 0.25, 7000.0)
+    for name, young, poisson, density in materials:
         laws = [sp.HertzLaw(young, poisson, RIGID, poisson, one, 3.9) for one in stated]
         ball = Ball(2.5e-3, density, (0, 0, -3.9))
         back = [float(on_plane(ball, law).velocities[0, 2]) / 3.9 for law in laws]

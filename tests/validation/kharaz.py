@@ -112,10 +112,8 @@ def rigid() -> Outcome:
                 far = angle > 9
                 findings += figures(bound, quantity, ours[far], value[far], of=f", {name}{steep}")
         panels.append(panel(quantity, marks, lines, OXIDE))
-    slow, less, whole = (
-        thrown(OXIDE, share * SPEED, [5.0, 15.0, 25.0, 35.0, 60.0])["restitution"]
-        for share in (0.01, 0.1, 1.0)
-    )
+    angles, speeds = [5.0, 15.0, 25.0, 35.0, 60.0], SPEED * np.array([0.01, 0.1, 1.0])
+    slow, less, whole = (thrown(OXIDE, speed, angles)["restitution"] for speed in speeds)
     what = "largest change of v'/v from 0.039 to 0.39 m/s", "the same from 0.039 to 3.9 m/s"
     findings += within(1e-3, (what[0], np.abs(less - slow).max()))
     findings += within(1e-3, (what[1], np.abs(whole - slow).max()), why=WHY["depth"])

@@ -32,10 +32,8 @@ class Part:
     def errors(self, normals: Array | None = None) -> tuple[float, float]:
         """Largest error of the closest distance on the curved and on the flat elements."""
         shell = Shell(self.vertices, self.elements, normals=normals)
-        curved, flat = (
-            np.abs(np.abs(shell.closest_points(self.places, method=m).distances) - self.distances)
-            for m in ("smooth", "facets")
-        )
+        found = (shell.closest_points(self.places, method=m) for m in ("smooth", "facets"))
+        curved, flat = (np.abs(np.abs(one.distances) - self.distances) for one in found)
         return float(curved.max()), float(flat.max())
 
     def is_worse_than_flat(self, normals: Array | None = None, tolerance: float = 1e-3) -> bool:

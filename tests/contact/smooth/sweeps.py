@@ -65,9 +65,8 @@ def assert_continuous(shell, paths, depth: float, least: int = 1, limit: float =
     for path in paths:
         pairs = sweep(shell, path)
         seen += len(pairs) - 1
-        for (force, potential), (before, _) in zip(
-            changes(shell, pairs, depth), pairs, strict=True
-        ):
+        found = zip(changes(shell, pairs, depth), pairs, strict=True)
+        for (force, potential), (before, _) in found:
             worst = max(worst, (float(max(force, potential)), before.tolist()), key=lambda w: w[0])
     assert seen >= least
     assert worst[0] <= limit, worst

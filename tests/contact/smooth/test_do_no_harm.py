@@ -76,9 +76,8 @@ def test_smooth_shaded_solids(name: str, points) -> None:
     rng = np.random.default_rng(0)
     low, high = vertices.min(axis=0) - 0.3 * size, vertices.max(axis=0) + 0.3 * size
     places = rng.uniform(low, high, (1000, 3))
-    curved, flat = (
-        np.abs(shell.closest_points(places, method=m).distances) for m in ("smooth", "facets")
-    )
+    found = (shell.closest_points(places, method=m) for m in ("smooth", "facets"))
+    curved, flat = (np.abs(one.distances) for one in found)
     assert np.abs(curved - flat).max() <= 1e-3 * size
     assert shell.core_for("smooth").normals_set_aside.any()
 

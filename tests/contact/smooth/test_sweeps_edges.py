@@ -160,9 +160,8 @@ def assert_jumps_as_defined(shell, paths, depth: float) -> None:
     passes close a ring round a pit and two are equally high, either may be the last."""
     for path in paths:
         pairs = sweeps.sweep(shell, path)
-        for pair, (force, potential) in zip(
-            pairs, sweeps.changes(shell, pairs, depth), strict=True
-        ):
+        found = zip(pairs, sweeps.changes(shell, pairs, depth), strict=True)
+        for pair, (force, potential) in found:
             assert potential <= sweeps.LIMIT, (potential, pair[0].tolist())
             if force > sweeps.LIMIT:
                 # A little off the tie, which round-off decides.
