@@ -18,6 +18,8 @@ from sphshell_pin.study.report.swing import GRAVITY, mean_period
 
 # Damping of springs, as a part of the critical one: their oscillation at the start dies out.
 RATIO = 0.5
+# Stiffness of contacts whose depth should not count [N/m], and of bristles.
+STIFF = 1e7
 PRECISE = Adaptive(1e-8)
 TABLE_INERTIA = 1e4  # [kg m^2]: the ball does not slow the table
 UP = np.array([0.0, 0.0, 1.0])
@@ -39,11 +41,11 @@ class Ball:
         """Return I / (m (r - depth)^2), 2/5 for depth 0."""
         return self.inertia / (self.mass * (self.radius - depth) ** 2)
 
-    def spring(self, stiffness: float, ratio: float = RATIO) -> ImpactLaw:
+    def spring(self, stiffness: float = STIFF, ratio: float = RATIO) -> ImpactLaw:
         """Linear spring and dashpot, which is at its full strength almost from the touch on."""
         return ImpactLaw(stiffness, 1.0, 2 * ratio * math.sqrt(stiffness * self.mass), 1e-10)
 
-    def bristle(self, mu: float, stiffness: float, mass: float | None = None) -> BristleFriction:
+    def bristle(self, mu, stiffness=STIFF, mass=None) -> BristleFriction:
         """Bristles of one coefficient; `mass` [kg] that they move: of a round ball 2/7 of its."""
         moved = 2 / 7 * self.mass if mass is None else mass
         return BristleFriction(mu, mu, stiffness, 2 * RATIO * math.sqrt(stiffness * moved))

@@ -63,12 +63,9 @@ def difference(a, b, radius: float) -> float:  # type: ignore[no-untyped-def]
         free.remove(nearest)
         distance = 1.0 - a.depth[k] / radius
         weight = distance if distance > 1e-9 else 0.0
-        worst = max(
-            worst,
-            float(np.abs(b.point[nearest] - a.point[k]).max()),
-            float(np.abs(b.normal[nearest] - a.normal[k]).max() * weight),
-            float(abs(b.depth[nearest] - a.depth[k])),
-        )
+        apart = np.abs(b.point[nearest] - a.point[k]).max()
+        turned = np.abs(b.normal[nearest] - a.normal[k]).max() * weight
+        worst = max(worst, float(apart), float(turned), float(abs(b.depth[nearest] - a.depth[k])))
     return worst
 
 

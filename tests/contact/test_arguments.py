@@ -25,9 +25,8 @@ TWICE = {"restitution": 0.5, "speed": 1.0, "loss_tangent": 0.1, "frequency": 1.0
 
 
 def wrench(point=ZEROS, normal=UP, depth=0.01, **more):
-    sp.contact_wrench(
-        point, normal, depth, **{"motion_i": STILL, "motion_j": STILL, "law": LAW, **more}
-    )
+    given = {"motion_i": STILL, "motion_j": STILL, "law": LAW, **more}
+    sp.contact_wrench(point, normal, depth, **given)
 
 
 def batch(centers=(3, 3), radii=(1.0, 1.0, 1.0), **more):
@@ -75,6 +74,10 @@ REFUSED: list[tuple[str, Call]] = [
     ("at a lone contact point", lambda: wrench(law=sp.HertzLaw(1e7, 0.3))),
     ("path", lambda: sp.Shell.from_file(None)),
     ("path", lambda: sp.Shell.from_file(3)),
+    (
+        "elements must not be masked",
+        lambda: sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2)),
+    ),
     # Laws
     ("units", lambda: sp.ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="furlong")),
     ("young = -1.0 must be positive", lambda: sp.HertzLaw(-1.0, 0.3)),

@@ -31,20 +31,12 @@ def random_case(seed: int):
 @pytest.mark.parametrize("friction", [None, FRICTION])
 @pytest.mark.parametrize("seed", range(40))
 def test_against_plain_vectors(seed: int, friction) -> None:
-    point, normal, depth, motion_i, motion_j = random_case(seed)
-    on_i, on_j = contact_wrench(point, normal, depth, motion_i, motion_j, LAW, friction)
-    force = force_on_i(
-        point,
-        normal,
-        depth,
-        motion_i,
-        motion_j,
-        normal_force=impact,
-        coefficient=coulomb if friction else None,
-    )
+    case, coefficient = random_case(seed), coulomb if friction else None
+    on_i, on_j = contact_wrench(*case, LAW, friction)
+    force = force_on_i(*case, normal_force=impact, coefficient=coefficient)
     scale = np.linalg.norm(force) + 1.0
     assert np.abs(on_i.linear - force).max() <= 1e-12 * scale
-    assert np.abs(on_i.angular - np.cross(point, force)).max() <= 1e-11 * scale
+    assert np.abs(on_i.angular - np.cross(case[0], force)).max() <= 1e-11 * scale
     assert np.array_equal(on_i.vector, -on_j.vector)
 
 

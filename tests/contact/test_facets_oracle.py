@@ -1,6 +1,7 @@
 """The fast query meets the brute-force definition on random, structured and nasty surfaces."""
 
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
@@ -33,6 +34,23 @@ SURFACES = {
     "dense soup": (meshes.soup(120, seed=7, spread=0.2), (0.15,)),
 }
 
+
+def listed(vertices, elements) -> meshes.Mesh:
+    return np.array(vertices, dtype=float), np.array(elements, dtype=np.int32)
+
+
+# Two triangles on the same side of their edge are coplanar, but no planar face.
+for share, other in product((0.3, 0.999, 1.0, 1.5), ((0, 1, 3), (1, 0, 3))):
+    sheet = listed([(0, 0, 0), (1, 0, 0), (0, 1, 0), (1, share, 0)], [(0, 1, 2), other])
+    SURFACES[f"sheet folded flat, {share}, {other}"] = (sheet, (0.2, 1.0))
+# A wall without vertices of the floor that it stands on is not felt from below.
+FLOOR = [(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0)]
+WALL = [(-0.2, 0.05, 0), (0.2, 0.05, 0), (0.2, 0.05, 0.3), (-0.2, 0.05, 0.3)]
+HALVES = [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)]
+SURFACES["wall on a floor"] = (listed(FLOOR + WALL, HALVES), (0.1, 0.4))
+# The rim of an element that lies inside another one is no rim of the surface.
+INNER = [(-1, -1, 0), (1, -1, 0), (0, 1, 0), (-0.2, -0.4, 0), (0.3, -0.5, 0), (0.1, 0.1, 0)]
+SURFACES["one inside another"] = (listed(INNER, [(0, 1, 2), (3, 4, 5)]), (0.1, 0.5))
 
 CLOSED = ("cube", "cube of quads", "icosahedron")
 SETS = [(name, method, "both") for name in SURFACES for method in ("facets", "elements")]

@@ -3,6 +3,7 @@
 import copy
 import ctypes
 import gc
+import inspect
 import math
 import pickle
 import random
@@ -20,10 +21,9 @@ from tests import models
 from tests.contact.test_table_law import LAW_LINE, SPRING, TABLE
 from tests.scenario.files import DROP, write
 
-FORCE = ctypes.CFUNCTYPE(
-    ctypes.c_double, ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double)
-)
-ENERGY = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double, ctypes.POINTER(ctypes.c_double))
+NUMBER, LIST = ctypes.c_double, ctypes.POINTER(ctypes.c_double)
+FORCE = ctypes.CFUNCTYPE(NUMBER, NUMBER, NUMBER, LIST)
+ENERGY = ctypes.CFUNCTYPE(NUMBER, NUMBER, LIST)
 NUMBERS, SLIP = {"k": 1e6, "b": 0.5}, {"mu": 0.3, "v": 0.1}
 TWIN = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
 SMOOTH = sp.CoulombFriction(0.3, 0.3, 0.1, 0.2)  # a cubic up to 0.1 m/s
@@ -153,12 +153,9 @@ def test_derivatives_are_those_of_the_twin(own, twin, moves) -> None:
     ],
 )
 def test_a_run_is_that_of_the_twin_and_keeps_its_energy(own, twin, error) -> None:
-    ours, theirs = (
-        sp.Simulation(models.on_plate(models.ball(), *one), sp.Adaptive(1e-10)).run(
-            BALL, MOVES, 0.2, record_dt=1e-3
-        )
-        for one in (own, twin)
-    )
+    scenes = (models.on_plate(models.ball(), *one) for one in (own, twin))
+    given = sp.Adaptive(1e-10), BALL, MOVES, 0.2
+    ours, theirs = (models.run(scene, *given, record_dt=1e-3) for scene in scenes)
     np.testing.assert_allclose(ours.q, theirs.q, rtol=0, atol=error)
     assert np.abs(ours.energy.residual).max() < 1e-8
     assert (ours.energy.friction_loss[-1] > 1e-4) == (own[1] is not None)
@@ -211,18 +208,15 @@ def test_no_number_is_refused(wrong) -> None:
 
 def test_friction_that_follows_from_the_load_by_no_coefficient() -> None:
     """Adhesion: a part of the force that is there whatever the load."""
-    own = sp.FunctionFriction(
-        FORCE(lambda slip, normal, p: (p[0] + 0.2 * normal) * min(slip / 0.01, 1.0)),
-        {"adhesion": 3.0},
-    )
+    size = FORCE(lambda slip, normal, p: (p[0] + 0.2 * normal) * min(slip / 0.01, 1.0))
+    own = sp.FunctionFriction(size, {"adhesion": 3.0})
     scene = models.on_plate(models.ball(), TWIN, own)
     contacts = scene.contacts(BALL, MOVES)
     (normal,), (friction,) = contacts.normal_force, contacts.friction_force_world
     assert np.linalg.norm(friction) == pytest.approx(3.0 + 0.2 * normal, rel=1e-12)
     assert own.coefficient(1.0, 10.0) == pytest.approx(0.5)
-    slopes = scene.dynamics_derivatives(
-        BALL, MOVES, np.zeros(6), parameters=["ball-plate.friction.adhesion"]
-    )
+    names = ["ball-plate.friction.adhesion"]
+    slopes = scene.dynamics_derivatives(BALL, MOVES, np.zeros(6), parameters=names)
     # Of 1 N more of it.
     pushed = scene.model.inertias[1].mass * slopes.by_parameters[:3, 0]
     np.testing.assert_allclose(pushed, friction / np.linalg.norm(friction), rtol=0, atol=1e-6)
@@ -299,10 +293,7 @@ def test_functions_live_as_long_as_the_core_and_cycles_are_collected() -> None:
 
 def test_a_scenario_names_functions_which_looking_does_not_execute(tmp_path) -> None:
     code = f"import math\nopen({str(tmp_path / 'ran')!r}, 'a').close()\n"
-    code += "def force(d, r, p):\n    return p[0] * d * math.sqrt(d) * (1 - p[1] * r)\n"
-    code += "def size(s, n, p):\n    x = min(s / p[1], 1.0)\n"
-    code += "    return p[0] * n * x * (3 - x * x) / 2\n"
-    (tmp_path / "own.py").write_text(code)
+    (tmp_path / "own.py").write_text(code + inspect.getsource(force) + inspect.getsource(size))
     text = DROP.replace(LAW_LINE, f"{LAW}\n{FRICTION}")
     path = write(tmp_path, text)
     with pytest.warns(errors.SlowLawWarning):

@@ -5,6 +5,7 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.testing import assert_derivatives
+from tests import meshes
 from tests.contact.test_hertz_law import MODULUS
 from tests.models import block, on_shell
 from tests.oracle.hertz import hertz_contact
@@ -19,11 +20,8 @@ def halfpipe(**more) -> sp.Shell:
     angle = np.linspace(0, np.pi / 2, 25)
     right = np.stack([HALF + BEND * np.sin(angle), BEND - BEND * np.cos(angle)], -1)
     profile = np.concatenate([right[::-1] * [-1, 1], right])
-    n = len(profile)
-    vertices = np.concatenate(
-        [np.stack([profile[:, 0], np.full(n, y), profile[:, 1]], -1) for y in (-0.03, 0.03)]
-    )
-    return sp.Shell(vertices, [[i, i + 1, n + i + 1, n + i] for i in range(n - 1)], **more)
+    rails = [np.insert(profile, 1, y, axis=1) for y in (-0.03, 0.03)]
+    return sp.Shell(*meshes.ribbon(rails), **more)
 
 
 def scene(law=LAW, shell=None, gravity=0.0) -> sp.Scene:
@@ -70,33 +68,22 @@ def test_the_force_is_continuous_and_small_beside_the_normal() -> None:
 
 def button(sides: int = 32, across: int = 16) -> sp.Shell:
     """A disc that goes on into a round rim; the middle of one side of their joint is along x."""
-    angle, turn = np.linspace(0, np.pi / 2, across + 1), 2 * np.pi * np.arange(sides) / sides
-    turn = turn[:, None] + np.pi / sides
-    out = np.concatenate([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    up, middle = np.array([0.0, 0.0, 1.0]), [np.zeros(3)]
-    normals = [np.sin(a) * out + np.cos(a) * up for a in angle]
-    rings = [HALF * out + BEND * (n - up) for n in normals]
-    inner = np.arange(sides) + sides * np.arange(across)[:, None]
-    corners = inner, inner + sides, np.roll(inner, -1, axis=1) + sides, np.roll(inner, -1, axis=1)
-    fan = [[-1, k, (k + 1) % sides, -1] for k in range(sides)]
-    fan = np.array(fan) + [sides * (across + 1) + 1, 0, 0, 0]
-    quads = np.stack(corners, axis=-1).reshape(-1, 4)
-    return sp.Shell(
-        np.concatenate([*rings, middle]),
-        np.concatenate([fan, quads]),
-        normals=np.concatenate([*normals, [up]]),
-    )
+    angle = np.linspace(0, np.pi / 2, across + 1)
+    turns = 2 * np.pi * (np.arange(sides) + 0.5) / sides
+    rim = np.stack([HALF + BEND * np.sin(angle), BEND * np.cos(angle) - BEND], axis=1)
+    vertices, elements = meshes.revolved([(0.0, 0.0), *rim], turns)
+    slope = np.append(0.0, np.repeat(angle, sides))
+    out = np.append([0.0], np.tile(turns, across + 1))
+    normals = [np.sin(slope) * np.cos(out), np.sin(slope) * np.sin(out), np.cos(slope)]
+    return sp.Shell(vertices, elements[:, ::-1], normals=np.transpose(normals))
 
 
 def test_the_force_is_continuous_beside_a_joint_that_bulges_beyond_its_chords() -> None:
     one, places = scene(shell=button()), np.linspace(-1.2, 1.2, 401) * LENGTH
     reach = BEND + RADIUS - DEPTH
-    centers = [
-        np.array([HALF + reach * np.sin(a), 0.0, reach * np.cos(a) - BEND])
-        if a > 0
-        else np.array([HALF + a * BEND, 0.0, RADIUS - DEPTH])
-        for a in places / BEND
-    ]
+    flat, bent = np.minimum(places, 0.0), np.maximum(places, 0.0) / BEND
+    across, height = HALF + flat + reach * np.sin(bent), reach * np.cos(bent) - BEND
+    centers = np.stack([across, 0 * across, height], axis=1)
     forces = np.array([force(one, at) for at in centers])
     size = np.linalg.norm(forces, axis=1)
     assert np.abs(np.diff(forces, axis=0)).max() < 3e-3 * size.max()
@@ -119,8 +106,7 @@ def test_a_ball_that_slides_over_joints_keeps_its_energy(faces: bool) -> None:
     for one in (law, law.on_plane(RADIUS)):
         several = scene(one, halfpipe(faces=faces), 9.81)
         start = np.array([0.0, 0.002, RADIUS - depth])
-        run = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11)).run(
-            start, np.array([0.25, 0.0, 0.0]), 1.0
-        )
+        simulation = sp.Simulation(several, sp.Adaptive(1e-8, 1e-11))
+        run = simulation.run(start, np.array([0.25, 0.0, 0.0]), 1.0)
         residuals.append(np.abs(run.energy.residual).max() / run.energy.kinetic[0])
     assert residuals[0] < 5 * residuals[1] + 1e-6

@@ -6,7 +6,7 @@ import pytest
 
 import sphshell_pin as sp
 from tests import meshes
-from tests.models import ball, on_shell, square
+from tests.models import ball, free_q, on_shell, square
 from tests.oracle.hertz import hertz_contact
 
 YOUNG, POISSON = 1e7, 0.3
@@ -41,9 +41,8 @@ class Surface:
         h, along = self.step, np.array(self.slopes(u, v))
         turns = [self.normal(u + h, v) - self.normal(u - h, v)]
         turns.append(self.normal(u, v + h) - self.normal(u, v - h))
-        return np.sort(
-            np.linalg.eigvals(np.linalg.solve(along @ along.T, np.array(turns) @ along.T)) / (2 * h)
-        )
+        shape = np.linalg.solve(along @ along.T, np.array(turns) @ along.T) / (2 * h)
+        return np.sort(np.linalg.eigvals(shape))
 
     def shell(self, *, exact=True):
         normals = self.normals if exact else None
@@ -97,9 +96,8 @@ def ball_scene(shell, radius, law, gravity=(0, 0, 0)):
     return on_shell(model, shell, law, radius=radius)
 
 
-def force_on(scene, center, quaternion=(0, 0, 0, 1)):
-    q = np.array([*center, *quaternion])
-    return scene.external_forces(q, np.zeros(6))[1]
+def force_on(scene, center):
+    return scene.external_forces(free_q(center), np.zeros(6))[1]
 
 
 @pytest.mark.parametrize(
@@ -150,7 +148,7 @@ def test_energy_closes_where_the_curvature_changes_along_the_path(name) -> None:
     x, n = surface.middle()
     along = np.cross(n, [0.3, 0.2, 1.0])
     scene = ball_scene(surface.shell(), 0.3, LAW, gravity=-50 * n)
-    start = np.array([*(x + 0.297 * n), 0, 0, 0, 1])
+    start = free_q(x + 0.297 * n)
     speed = np.array([*(1.5 * along / np.linalg.norm(along)), 0, 0, 0])
     result = sp.Simulation(scene, sp.Adaptive(rtol=1e-10, atol=1e-12)).run(start, speed, 0.1)
     energy = result.energy
@@ -165,8 +163,7 @@ def test_restitution_is_that_stated(restitution) -> None:
     law = sp.HertzLaw(YOUNG, POISSON, restitution=restitution, speed=1.0)
     x, n = surface.middle()
     scene = ball_scene(surface.shell(), 0.3, law)
-    start = np.array([*(x + 0.3001 * n), 0, 0, 0, 1])
-    result = sp.Simulation(scene).run(start, np.array([*-n, 0, 0, 0]), 0.05)
+    result = sp.Simulation(scene).run(free_q(x + 0.3001 * n), [*-n, 0, 0, 0], 0.05)
     assert np.isclose(result.v[-1][:3] @ n, restitution, rtol=2e-3)
 
 
@@ -177,10 +174,8 @@ def test_a_loss_tangent_is_that_of_a_small_oscillation() -> None:
     depth, amplitude, omega = 1e-4, 1e-7, 2 * np.pi * frequency
     phase = np.linspace(0, 2 * np.pi, 2000, endpoint=False)
     rate = amplitude * omega * np.cos(phase)
-    force = [
-        law.normal_force(depth + amplitude * np.sin(a), -r)
-        for a, r in zip(phase, rate, strict=True)
-    ]
+    depths = depth + amplitude * np.sin(phase)
+    force = [law.normal_force(*one) for one in zip(depths, -rate, strict=True)]
     lost = np.mean(force * rate) * (2 * np.pi / omega)
     stored = 0.5 * law.normal_stiffness(depth) * amplitude**2
     assert np.isclose(lost / (2 * np.pi * stored), tangent, rtol=1e-5)
@@ -191,7 +186,7 @@ def test_a_socket_of_nearly_the_ball_s_radius_is_beyond_hertz() -> None:
     x, n = surface.middle()
     for radius, kinds in ((0.995, {"beyond_hertz"}), (0.97, set())):
         scene = ball_scene(surface.shell(), radius, sp.HertzLaw(1e9, POISSON))
-        start = np.array([*(x + (radius - 1e-4 * radius) * n), 0, 0, 0, 1])
+        start = free_q(x + (radius - 1e-4 * radius) * n)
         result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-5)).run(start, np.zeros(6), 1e-4)
         assert {e.kind for e in result.events} - {"touch", "lift_off", "deep"} == kinds
 
@@ -220,9 +215,9 @@ def test_ellipse_and_pressure_are_recorded(name, share) -> None:
     depth = 0.02 * share
     low, high = surface.curvatures(u, v)
     _, *expected = hertz_contact(0.5 * (1 / share + low), 0.5 * (1 / share + high), MODULUS, depth)
-    start = np.array([*(x + (share - depth) * n), 0, 0, 0, 1])
-    run = sp.Simulation(scene, sp.SemiImplicitEuler(1e-9))
-    patch = run.run(start, np.zeros(6), 1e-9, record=("patch",)).patches[0]
+    simulation = sp.Simulation(scene, sp.SemiImplicitEuler(1e-9))
+    start = free_q(x + (share - depth) * n)
+    patch = simulation.run(start, None, 1e-9, record=("patch",)).patches[0]
     found = [*patch["half_axes"], patch["peak_pressure"]]
     assert np.allclose(found, expected, rtol=2e-3)
     if name not in ("sphere", "ellipsoid"):

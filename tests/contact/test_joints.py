@@ -17,15 +17,6 @@ from tests.parts import occ
 MM = 1e-3
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("joints")
-
-
-def step_of(solid, folder: Path) -> Path:
-    return write_step(solid, folder / f"{len(list(folder.iterdir()))}.step")
-
-
 def test_no_sphere_is_lost_beside_the_rounded_rim_of_the_valve_body():
     shell, center = sp.Shell.from_file(VALVE_BODY), [0.040307777, 0.003406919, -0.005294333]
     around = center + np.random.default_rng(0).uniform(-1e-4, 1e-4, (500, 3))
@@ -35,17 +26,17 @@ def test_no_sphere_is_lost_beside_the_rounded_rim_of_the_valve_body():
     assert np.abs(deepest - flat).max() <= 1e-3 * 6e-3
 
 
-def with_few_digits(path: Path, digits: int) -> Path:
-    """The file with the coordinates of its vertices rounded [mm]."""
+def read(solid, folder: Path, digits: int | None = None, **more) -> sp.Shell:
+    """The shell of a STEP file, the coordinates of its vertices rounded to some digits [mm]."""
+    path = write_step(solid, folder / "part.step")
     text = path.read_text()
-    for point in re.findall(r"VERTEX_POINT\('',#(\d+)\)", text):
+    for point in re.findall(r"VERTEX_POINT\('',#(\d+)\)", text) if digits else ():
         old = re.search(rf"#{point} = CARTESIAN_POINT\('',\((.*?)\)\s*\)", text, re.DOTALL)
         numbers = [round(float(x), digits) for x in old[1].split(",")]
         new = f"#{point} = CARTESIAN_POINT('',({','.join(map(str, numbers))}))"
         text = text.replace(old[0], new)
-    out = path.with_name(f"few_{path.name}")
-    out.write_text(text)
-    return out
+    path.write_text(text)
+    return sp.Shell.from_file(path, **more)
 
 
 def tee():
@@ -55,9 +46,8 @@ def tee():
     return occ.placed(occ.cut(outside, *inside), np.random.default_rng(1), 20.0)
 
 
-def test_vertices_of_a_file_are_moved_onto_its_faces(folder):
-    path = step_of(tee(), folder)
-    few = sp.Shell.from_file(with_few_digits(path, 5))
+def test_vertices_of_a_file_are_moved_onto_its_faces(tmp_path):
+    few = read(tee(), tmp_path, 5)
     assert all(face.exact for face in few.faces)
     bore = next(f for f in few.faces if f.kind == "cylinder" and abs(f.radius - 9.781e-3) < 1e-9)
     rng, ball = np.random.default_rng(0), 0.9 * bore.radius
@@ -70,20 +60,20 @@ def test_vertices_of_a_file_are_moved_onto_its_faces(folder):
     assert np.abs(deepest - 0.01 * bore.radius).max() <= 1e-12 * ball
 
 
-def test_a_face_says_why_it_is_not_exact(folder):
-    rough = sp.Shell.from_file(with_few_digits(step_of(tee(), folder), 1))
+def test_a_face_says_why_it_is_not_exact(tmp_path):
+    rough = read(tee(), tmp_path, 1)
     reasons = [face.reason for face in rough.faces if not face.exact]
     assert reasons
     assert all(reason.endswith(" nm") and "off it by" in reason for reason in reasons)
     assert all(face.reason == "" for face in rough.faces if face.exact)
 
 
-def test_a_plane_is_flat_however_far_off_it_its_vertices_are(folder):
+def test_a_plane_is_flat_however_far_off_it_its_vertices_are(tmp_path):
     """Files of some systems are off by micrometers; forces on planes are exact all the same."""
     block = occ.box([-20, -20, 0], [20, 20, 8])
     upright = occ.edges_where(block, lambda p: np.ptp(p[:, 2]) > 1)
     solid = occ.placed(occ.filleted(block, upright, 3.0), np.random.default_rng(2), 0.0)
-    shell = sp.Shell.from_file(with_few_digits(step_of(solid, folder), 2))
+    shell = read(solid, tmp_path, 2)
     rng, ball, depth, law = np.random.default_rng(0), 1e-3, 1e-6, sp.ImpactLaw(1.0, 1.5)
     planes = [face for face in shell.faces if face.kind == "plane"]
     assert len(planes) == 6
@@ -98,9 +88,9 @@ def test_a_plane_is_flat_however_far_off_it_its_vertices_are(folder):
             assert np.linalg.norm(force) == pytest.approx(depth**1.5, rel=1e-9)
 
 
-def test_where_cylinders_end_in_planes_the_planes_stay_flat(folder):
+def test_where_cylinders_end_in_planes_the_planes_stay_flat(tmp_path):
     """Borders are moved onto both faces at once; a plane has the last word."""
-    shell = sp.Shell.from_file(step_of(BOXES["mitre"](np.random.default_rng(0)), folder))
+    shell = read(BOXES["mitre"](np.random.default_rng(0)), tmp_path)
     points, _, _ = curved_mesh(shell, 3)
     points = points.reshape(len(shell.triangles), -1, 3)
     for face in shell.faces:
@@ -137,15 +127,14 @@ def test_a_border_that_runs_through_the_facet_beside_its_own():
             assert found.depth == pytest.approx([radius - np.hypot(height, aside)], abs=1e-14)
 
 
-def test_a_border_to_a_free_form_face_ends_on_its_face(folder):
+def test_a_border_to_a_free_form_face_ends_on_its_face(tmp_path):
     """Of a boss whose fillet is no simple face: it is exact, and nothing is lost."""
-    solid = occ.fuse(
-        occ.box([-20, -20, 0], [20, 20, 8]), occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
-    )
+    boss = occ.cylinder(6.0, 40.0, [0, 0, 4], [0.4, 0, 1])
+    solid = occ.fuse(occ.box([-20, -20, 0], [20, 20, 8]), boss)
     at_foot = occ.edges_where(
         solid, lambda p: abs(p[0, 2] - 8) < 1e-6 > np.ptp(p[:, 2]) and np.abs(p).max() < 12
     )
-    shell = sp.Shell.from_file(step_of(occ.filleted(solid, at_foot, 2.0), folder), chord_error=2e-4)
+    shell = read(occ.filleted(solid, at_foot, 2.0), tmp_path, chord_error=2e-4)
     (boss,) = [face for face in shell.faces if face.kind == "cylinder"]
     assert boss.exact
     rng, count, ball, depth = np.random.default_rng(0), 300, 2e-3, 2e-4

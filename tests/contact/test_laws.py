@@ -1,4 +1,4 @@
-"""Force laws and friction: documented spot values, units, closed forms, limits."""
+"""Force laws, friction, two materials: documented spot values, units, closed forms, limits."""
 
 import dataclasses
 from decimal import Decimal, localcontext
@@ -8,39 +8,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import sphshell_pin as sp
 from sphshell_pin import CoulombFriction, HuntCrossleyLaw, ImpactLaw
 from tests.oracle import laws as oracle
-from tests.validation.restitution import hunt_crossley_restitution
 
 MM = 1e-3
 DEFAULTS = ImpactLaw.from_adams(1e5, 2.2, 10.0, 0.1, units="mm-N-s")
 
 
-@pytest.mark.parametrize(
-    ("depth", "gap_rate", "force"),
-    [
-        (0.05, 0.0, 137.320068),
-        (0.05, -100.0, 637.320068),
-        (0.05, 100.0, 0.0),
-        (0.1, -100.0, 1630.957344),
-        (0.2, -1000.0, 12899.118655),
-        (0.01, 100.0, 0.0),
-    ],
-)
-def test_impact_spot_values(depth: float, gap_rate: float, force: float) -> None:
+def test_impact_spot_values() -> None:
     """ADAMS's IMPACT with its default numbers, mm and mm/s."""
-    assert DEFAULTS.normal_force(depth * MM, gap_rate * MM) == pytest.approx(force, abs=5e-7)
+    depths = np.array([0.05, 0.05, 0.05, 0.1, 0.2, 0.01]) * MM
+    rates = np.array([0.0, -100.0, 100.0, -100.0, -1000.0, 100.0]) * MM
+    found = [DEFAULTS.normal_force(*one) for one in zip(depths, rates, strict=True)]
+    forces = [137.320068, 637.320068, 0.0, 1630.957344, 12899.118655, 0.0]
+    assert found == pytest.approx(forces, rel=0, abs=5e-7)
 
 
 COULOMB = CoulombFriction(mu_static=0.3, mu_dynamic=0.1, v_static=0.1, v_dynamic=1.0)
 
 
-@pytest.mark.parametrize(
-    ("slip_mm", "mu"),
-    [(0, 0), (10, 0.04485), (50, 0.20625), (100, 0.3), (300, 0.27476), (550, 0.2), (1000, 0.1)],
-)
-def test_friction_spot_values(slip_mm: float, mu: float) -> None:
-    assert COULOMB.coefficient(slip_mm * 1e-3) == pytest.approx(mu, abs=5e-6)
+def test_friction_spot_values() -> None:
+    found = [COULOMB.coefficient(slip * MM) for slip in (0, 10, 50, 100, 300, 550, 1000)]
+    expected = [0, 0.04485, 0.20625, 0.3, 0.27476, 0.2, 0.1]
+    assert found == pytest.approx(expected, rel=0, abs=5e-6)
 
 
 @settings(derandomize=True, deadline=None)
@@ -99,19 +90,13 @@ def test_hertz_of_two_materials() -> None:
     assert damped == HuntCrossleyLaw.with_restitution(law.stiffness, 1.5, 0.7, 0.3)
 
 
-@pytest.mark.parametrize("restitution", [0.05, 0.3, 0.7, 0.95, 0.999])
-@pytest.mark.parametrize("speed", [0.01, 0.3, 5.0])
-def test_hertz_with_restitution(restitution: float, speed: float) -> None:
+RESTITUTIONS = [0.05, 0.3, 0.5, 0.7, 0.9, 0.93, 0.99, 0.99999, 1 - 1e-7, 1 - 1e-14]
+
+
+@pytest.mark.parametrize("speed", [0.01, 0.5, 5.0])
+@pytest.mark.parametrize("restitution", RESTITUTIONS)
+def test_dissipation_is_exact_however_near_the_restitution_is_to_one(restitution, speed) -> None:
     """d v0 - ln(1 + d v0) = -d v1 - ln(1 - d v1), v1 = restitution v0."""
-    law = ImpactLaw.hertz(0.01, 207e9, 0.29, 207e9, 0.29, restitution=restitution, speed=speed)
-    assert isinstance(law, HuntCrossleyLaw)
-    assert law.exponent == 1.5
-    got = hunt_crossley_restitution(speed, law.dissipation)
-    assert got == pytest.approx(restitution, abs=1e-8)
-
-
-@pytest.mark.parametrize("restitution", [0.5, 0.9, 0.93, 0.99, 0.99999, 1 - 1e-7, 1 - 1e-14])
-def test_dissipation_is_exact_however_near_the_restitution_is_to_one(restitution: float) -> None:
     with localcontext(prec=60):
         e = Decimal(restitution)
 
@@ -123,11 +108,43 @@ def test_dissipation_is_exact_however_near_the_restitution_is_to_one(restitution
             middle = (low + high) / 2
             low, high = (middle, high) if excess(middle) < 0 else (low, middle)
         exact = float(low)
-    law = HuntCrossleyLaw.with_restitution(1e5, 1.5, restitution, 0.5)
-    assert 0.5 * law.dissipation == pytest.approx(exact, rel=2e-14)
+    law = HuntCrossleyLaw.with_restitution(1e5, 1.5, restitution, speed)
+    assert speed * law.dissipation == pytest.approx(exact, rel=2e-14)
 
 
 def test_laws_are_values() -> None:
     assert ImpactLaw(1.0, 1.5, 0.0, 1.0) == ImpactLaw(1.0, 1.5, 0.0, 1.0)
     with pytest.raises(dataclasses.FrozenInstanceError):
         DEFAULTS.stiffness = 1.0
+
+
+M = sp.MATERIALS
+
+
+@pytest.mark.parametrize("name", M)
+def test_against_steel_they_are_those_of_the_table(name):
+    one = M[name]
+    static, dynamic = one.friction, one.friction * one.slip
+    for pair in ((one, M["steel"]), (M["steel"], one)):
+        assert sp.friction_between(*pair) == pytest.approx((static, dynamic), rel=1e-15)
+        assert sp.restitution_between(*pair) == min(one.restitution, 0.90)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "static", "dynamic"),
+    [
+        ("rubber", "wood", 0.80, 0.80 * 0.85),  # a thousand times softer: it conforms
+        ("silicone", "rubber", 0.70, 0.70 * 0.85),
+        ("plastic", "aluminium", 0.30, 0.30 * 0.80),  # 28 times softer
+        ("plastic", "wood", 0.35, 0.35 * 0.80),  # 4 times: the mean, the slip of the softer one
+        ("wood", "aluminium", 0.425, 0.425 * 0.75),  # 7 times
+    ],
+)
+def test_the_much_softer_one_decides_else_the_mean(one, other, static, dynamic):
+    for pair in ((M[one], M[other]), (M[other], M[one])):
+        assert sp.friction_between(*pair) == pytest.approx((static, dynamic), rel=1e-12)
+
+
+def test_the_more_dissipative_one_decides_the_restitution():
+    assert sp.restitution_between(M["wood"], M["rubber"]) == 0.60
+    assert sp.restitution_between(M["plastic"], M["rubber"]) == 0.70

@@ -85,11 +85,8 @@ def worst_loop(shell: sp.Shell, radius: float, law, loops: int, method: str | No
     rng, still, worst, found = np.random.default_rng(7), np.zeros(3), 0.0, 0
     while found < loops:
         corners = triangle(shell, radius, rng)
-        sides = [
-            a + u * (b - a)
-            for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)
-            for u in np.linspace(0, 1, 6)
-        ]
+        ends = zip(corners, np.roll(corners, -1, 0), strict=True)
+        sides = [a + u * (b - a) for a, b in ends for u in np.linspace(0, 1, 6)]
         deep = [shell.contacts(x, radius).depth.max(initial=0.0) for x in sides]
         # Beyond that the laws are out of their range.
         if not 0 < max(deep) < 0.2 * radius:

@@ -87,10 +87,8 @@ def test_a_soft_law_under_a_light_load() -> None:
 
 def test_a_law_that_cannot_carry_the_load_has_its_other_scales() -> None:
     layer = sp.FoundationLaw(1e6, 0.05).on_plane(0.05)
-    for inverted, most in (
-        (layer.depth_at, layer.normal_force(0.05)),
-        (layer.depth_of, layer.energy(0.05)),
-    ):
+    inverses = (layer.depth_at, layer.normal_force(0.05)), (layer.depth_of, layer.energy(0.05))
+    for inverted, most in inverses:
         assert inverted(most) == pytest.approx(0.05, rel=1e-9)
         assert inverted(3 * most) == pytest.approx(0.15, rel=1e-12)
         assert inverted(0.5 * most) < 0.05

@@ -14,12 +14,9 @@ UP = np.array([0.0, 0.0, 1.0])
 def sheets(gap: float) -> Shell:
     """Two plates, one above the other."""
     vertices, elements = meshes.grid_plate(3, 3, 4.0)
-    return Shell(
-        np.concatenate([vertices, vertices + gap * UP]),
-        np.concatenate([elements, elements + len(vertices)]),
-        crease_angle=0.0,
-        clean=False,
-    )
+    both = np.concatenate([vertices, vertices + gap * UP])
+    doubled = np.concatenate([elements, elements + len(vertices)])
+    return Shell(both, doubled, crease_angle=0.0, clean=False)
 
 
 @pytest.mark.parametrize(

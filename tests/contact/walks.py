@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from sphshell_pin import Shell
-from tests.contact.helpers import energy
+from tests.contact.helpers import energy, force_sum
 
 # Two centres this share of the radius apart are on two sides of a border of regions.
 WIDTH = 1e-12
@@ -59,18 +59,28 @@ def borders(find, start, end, width: float) -> list[list[np.ndarray]]:
     return found
 
 
+def change(before, after, move) -> tuple[float, float, float]:
+    """Potential that the forces do not account for, potential, and largest force times move."""
+    v0, v1, f0, f1 = energy(before), energy(after), force_sum(before), force_sum(after)
+    size = max(sum(c.terms.depth**1.5) for c in (before, after))
+    return abs(v1 - v0 + (f0 + f1) @ move / 2), max(v0, v1), size * float(np.linalg.norm(move))
+
+
+def jump(before, after, move) -> float:
+    """Jump of the potential between two centres that are near each other, as a share of it."""
+    lost, potential, most = change(before, after, move)
+    return max(lost - most, 0.0) / potential if potential > 0 else 0.0
+
+
 def jumps(shell, method, path, radius=1.0, limit=1e-9) -> list[tuple[list[float], float]]:
     """Places where the potential of depth^1.5 jumps by more than `limit` of itself, and the share
     by which it does."""
     found, find = [], partial(shell.contacts, radius=radius, method=method)
     for ends in pairwise(path):
         for low, high in borders(find, *ends, WIDTH * radius):
-            sides = [find(low), find(high)]
-            size = max(np.abs(one.terms.weight) @ one.terms.depth**1.5 for one in sides)
-            before, after = map(energy, sides)
-            lost = abs(after - before) - size * np.linalg.norm(high - low)
-            if lost > limit * max(before, after):
-                found.append((low.tolist(), lost / max(before, after)))
+            share = jump(find(low), find(high), high - low)
+            if share > limit:
+                found.append((low.tolist(), share))
     return found
 
 

@@ -113,15 +113,10 @@ def two_pairs(law, friction) -> State:  # type: ignore[no-untyped-def]
     """Two spheres on the arm touch two plates, one of them with bristles, one on a link."""
     scene, q, v = on_plate(law, friction)
     link, tip = (models.pose_of(scene.model, q, name) for name in ("two", "ball"))
-    scene.add_contact(
-        sp.Sphere(0.04, "ball", (0.02, 0.0, 0.01)),
-        models.plate(),
-        "two",
-        link.actInv(pin.SE3(meshes.random_rotation(8), tip.translation)),
-        law=LAWS["hertz"],
-        friction=FRICTIONS["soft finger"],
-        name="second",
-    )
+    place = link.actInv(pin.SE3(meshes.random_rotation(8), tip.translation))
+    sphere = sp.Sphere(0.04, "ball", (0.02, 0.0, 0.01))
+    laws = (LAWS["hertz"], FRICTIONS["soft finger"])
+    scene.add_contact(sphere, models.plate(), "two", place, *laws, name="second")
     return scene, q, v
 
 
@@ -234,9 +229,10 @@ def stuck() -> tuple[State, sp.results.SceneState]:
     return (scene, q, v), state
 
 
-def difference(f: Callable[[float], Array], step: float) -> Array:
-    """The central difference of f at 0."""
-    return (f(step) - f(-step)) / (2 * step)
+def columns(f: Callable[[Array], Array], count: int, step: float) -> Array:
+    """The central differences of f at 0 by each of so many numbers."""
+    steps = step * np.eye(count)
+    return np.transpose([(f(one) - f(-one)) / (2 * step) for one in steps])
 
 
 def assert_close(got: Array, expected: Array, tolerance: float = 1e-6, rounding: float = 0) -> None:
@@ -263,14 +259,8 @@ def assert_rate_jacobian(scene, q, v, z, *, step=1e-6, turning=1e-6):
     tau = np.random.default_rng(1).normal(size=nv)
     got = core.rate_jacobian(q, v, z, tau)
     assert got.shape == (nv + len(z), 2 * nv + len(z))
-    eye, scale = np.eye(nv), 1e-4 * np.abs(z).max(initial=0.0)
-    by_q, by_v = (
-        np.transpose([difference(lambda x, e=e, f=f: f(x * e), step) for e in eye])
-        for f in (
-            lambda u: core.rates(pin.integrate(model, q, u), v, z, tau),
-            lambda u: core.rates(q, v + u, z, tau),
-        )
-    )
+    by_q = columns(lambda u: core.rates(pin.integrate(model, q, u), v, z, tau), nv, step)
+    by_v = columns(lambda u: core.rates(q, v + u, z, tau), nv, step)
     assert_close(got[:nv, :nv], by_q[:nv])
     assert_close(got[:nv, nv : 2 * nv], by_v[:nv])
     if len(z) == 0:
@@ -279,9 +269,7 @@ def assert_rate_jacobian(scene, q, v, z, *, step=1e-6, turning=1e-6):
     rounding = 50 * np.finfo(float).eps * np.abs(core.rates(q, v, z, tau)[nv:]).max() / step
     assert_close(got[nv:, :nv], by_q[nv:], turning, rounding)
     assert_close(got[nv:, nv : 2 * nv], by_v[nv:], rounding=rounding)
-    by_z = np.transpose(
-        [difference(lambda x, e=e: core.rates(q, v, z + x * e, tau), scale) for e in np.eye(len(z))]
-    )
+    by_z = columns(lambda u: core.rates(q, v, z + u, tau), len(z), 1e-4 * np.abs(z).max())
     assert np.abs(by_z[:nv]).max() > 1 or not scene.pairs
     assert_close(got[:nv, 2 * nv :], by_z[:nv])
     assert np.abs(got[nv:, 2 * nv :] - by_z[nv:]).max() <= 1e-6 * max(1.0, np.abs(by_z[nv:]).max())

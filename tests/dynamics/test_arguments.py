@@ -58,16 +58,7 @@ def run(q=HIGH, v=None, duration=0.1, **more):
 
 
 def opened():
-    simulation = Simulation(on_plate(ball(), LAW), sp.SemiImplicitEuler(1e-4))
-    return OpenRun(simulation, HIGH, record_dt=1e-3)
-
-
-def push(*given):
-    opened().push(*given)
-
-
-def pull(*given):
-    opened().pull(*given)
+    return OpenRun(Simulation(on_plate(ball(), LAW)), HIGH, record_dt=1e-3)
 
 
 def pd(**gains):
@@ -106,10 +97,6 @@ def switch(contact="b", **more):
 
 def sensing(sensors):
     Simulation(Scene(ball()), None, sensors)
-
-
-def derive(tau):
-    Scene(arm()).dynamics_derivatives(ARM_Q, np.zeros(3), tau)
 
 
 def on_sphere(**more):
@@ -186,16 +173,17 @@ REFUSED: list[tuple[str, Call]] = [
     ("name = .* must be a name", lambda: on_plate(ball(), LAW).replace_pair(NAMES, law=LAW)),
     ("pair = .* must be a name", lambda: ShellTaxels(NAMES)),
     ("q = .* finite", lambda: run(HIGH * np.nan)),
+    ("t0", lambda: run(t0=1e13)),
     ("v = .* finite", lambda: run(v=np.full(6, np.inf))),
     *(("duration", lambda one=one: run(duration=one)) for one in (-1.0, NAN, np.inf)),
-    ("fixed to the world", lambda: push("universe", [1, 0, 0])),
-    ("force_world", lambda: push("ball", [1, 0])),
-    ("force_world", lambda: push("ball", [1, 0, NAN])),
-    ("fixed to the world", lambda: pull("universe", ZEROS, ZEROS, 1.0)),
-    ("point", lambda: pull("ball", [0, 0], ZEROS, 1.0)),
-    ("anchor_world", lambda: pull("ball", ZEROS, [0, 0, np.inf], 1.0)),
-    ("stiffness", lambda: pull("ball", ZEROS, ZEROS, -1.0)),
-    ("damping", lambda: pull("ball", ZEROS, ZEROS, 1.0, NAN)),
+    ("fixed to the world", lambda: opened().push("universe", [1, 0, 0])),
+    ("force_world", lambda: opened().push("ball", [1, 0])),
+    ("force_world", lambda: opened().push("ball", [1, 0, NAN])),
+    ("fixed to the world", lambda: opened().pull("universe", ZEROS, ZEROS, 1.0)),
+    ("point", lambda: opened().pull("ball", [0, 0], ZEROS, 1.0)),
+    ("anchor_world", lambda: opened().pull("ball", ZEROS, [0, 0, np.inf], 1.0)),
+    ("stiffness", lambda: opened().pull("ball", ZEROS, ZEROS, -1.0)),
+    ("damping", lambda: opened().pull("ball", ZEROS, ZEROS, 1.0, NAN)),
     ("damping.one_joint.*negative", lambda: jointed(damping={"one_joint": -1.0})),
     ("damping.*one number or 1", lambda: jointed(damping={"one_joint": [1.0, 2.0]})),
     ("effort.*lower <= 0", lambda: jointed(effort={"one_joint": (1.0, 5.0)})),
@@ -220,8 +208,12 @@ REFUSED: list[tuple[str, Call]] = [
     ("must be one of the two", lambda: switch(contact=None)),
     ("release = 2.0 must not be above threshold = 1", lambda: switch(release=2)),
     ("must be 'patch' or 'torque'", lambda: run(record=["force"])),
+    *(("record", lambda one=one: run(record=one)) for one in ("patch", ["pitch"], 3)),
     ("tau has shape", lambda: run(controller=lambda t, q, v, c: np.zeros(5), control_dt=1e-2)),
-    *(("tau", lambda one=one: derive(one)) for one in (np.zeros(4), np.full(3, NAN), "heavy")),
+    *(
+        ("tau", lambda one=one: Scene(arm()).dynamics_derivatives(ARM_Q, np.zeros(3), one))
+        for one in (np.zeros(4), np.full(3, NAN), "heavy")
+    ),
 ]
 
 
@@ -238,7 +230,7 @@ def test_a_wrong_argument_is_named(words: str, call: Call) -> None:
     [
         (FrameNotFound, "ball universe", lambda: add(sphere=Sphere(0.05, "bll"))),
         (FrameNotFound, "ball universe", lambda: add(frame="ground")),
-        (FrameNotFound, "ball", lambda: push("bal", [1, 0, 0])),
+        (FrameNotFound, "ball", lambda: opened().push("bal", [1, 0, 0])),
         (FrameNotFound, "ball", lambda: spheres([BALL, Sphere(0.05, "hand")])),
         (NameNotFound, "facets", lambda: change(method="x")),
         (NameNotFound, "facets", lambda: add(method=5)),

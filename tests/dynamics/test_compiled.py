@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.compiled import robot as compiled_robot
 from sphshell_pin.errors import InvalidParameter, SetupWarning, SphshellError
 from tests import meshes
 from tests.dynamics.test_mimic import gripper
+from tests.models import pose_of
 
 pytest.importorskip("casadi")
 
@@ -55,19 +56,17 @@ def all_kinds() -> pin.Model:
 
 
 def arm() -> pin.Model:
-    kinds = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
-    return tree(*(kind() for kind in kinds), branches=False)
+    return tree(pin.JointModelRX(), pin.JointModelRY(), pin.JointModelRZ(), branches=False)
 
 
 def touching(model: pin.Model, q: Array, compiled: bool) -> sp.Scene:
     """A sphere at the last body, which begins in a plate."""
     scene = sp.Scene(model, compiled=compiled)
-    frame, data, radius = model.frames[model.nframes - 1], model.createData(), 0.05
-    pin.framesForwardKinematics(model, data, q)
-    below = data.oMf[model.nframes - 1].translation - [0.0, 0.0, 0.9 * radius]
+    tip, radius = model.frames[model.nframes - 1].name, 0.05
+    below = pose_of(model, q, tip).translation - [0.0, 0.0, 0.9 * radius]
     place, plate = pin.SE3(np.eye(3), below), sp.Shell(*meshes.grid_plate(4, 4, 2.0))
     law, friction = sp.HuntCrossleyLaw(1e4, 1.5, 0.1), sp.BristleFriction(0.5, 0.4, 1e3, 1.0, 1e-2)
-    scene.add_contact(sp.Sphere(radius, frame.name), plate, "universe", place, law, friction)
+    scene.add_contact(sp.Sphere(radius, tip), plate, "universe", place, law, friction)
     return scene
 
 

@@ -1,28 +1,26 @@
 """Contacts as constraints for Pinocchio's ADMM: rolling, sliding, and what they state."""
 
+from itertools import product
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import InvalidParameter
-from tests import meshes
-from tests.models import ball
+from tests.models import ball, on_shell, square
 
 RADIUS, MASS, DT = 0.02, 0.26, 1e-3
 
 
 def ball_on_a_slope(angle: float, mu: float | None):
     """A steel ball that rests on a slope, turned in its joint, and its configuration."""
-    model = ball(9.81, MASS, RADIUS)
     law, turn = sp.HertzLaw.of("steel", "steel"), pin.exp3(np.array([0.0, angle, 0.0]))
-    plate = sp.Shell(*meshes.grid_plate(size=2.0, quads=True))
-    friction = None if mu is None else sp.CoulombFriction(mu, mu)
-    scene = sp.Scene(model)
     placement = pin.SE3(turn, np.array([0.1, 0.2, 0.3]))
-    scene.add_contact(
-        sp.Sphere(RADIUS, "ball"), plate, placement=placement, law=law, friction=friction
-    )
+    friction = None if mu is None else sp.CoulombFriction(mu, mu)
+    model, more = ball(9.81, MASS, RADIUS), {"radius": RADIUS, "placement": placement}
+    scene = on_shell(model, square(), law, friction, **more)
     depth = scene.pairs[0].plane_law.depth_at(MASS * 9.81 * np.cos(angle))
     q = pin.neutral(model)
     q[:3] = placement.translation + (RADIUS - depth) * turn[:, 2]
@@ -35,8 +33,7 @@ def solved(scene: sp.Scene, q) -> np.ndarray:
     (constraint,) = scene.constraints(q).models
     model, data = scene.model, scene.model.createData()
     pin.computeJointJacobians(model, data, q)
-    mass = pin.crba(model, data, q)
-    mass = np.triu(mass) + np.triu(mass, 1).T
+    mass = mass_matrix(model, q)
     free = -DT * np.linalg.solve(mass, pin.nonLinearEffects(model, data, q, np.zeros(model.nv)))
     models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
     models.append(pin.ConstraintModel(constraint))
@@ -48,10 +45,8 @@ def solved(scene: sp.Scene, q) -> np.ndarray:
     delassus = pin.DelassusOperatorDense(jacobian @ np.linalg.solve(mass, jacobian.T))
     settings, result = pin.ADMMSolverSettings(), pin.ADMMSolverResult()
     settings.max_iterations = 10_000
-    for name in ("absolute_feasibility_tol", "absolute_complementarity_tol"):
-        setattr(settings, name, 1e-14)
-    for name in ("relative_feasibility_tol", "relative_complementarity_tol"):
-        setattr(settings, name, 1e-14)
+    for name in product(("absolute", "relative"), ("feasibility", "complementarity")):
+        setattr(settings, "_".join([*name, "tol"]), 1e-14)
     solver = pin.ADMMConstraintSolver()
     assert solver.solve(delassus, jacobian @ free, models, datas, settings, result)
     return np.array(result.retrieveConstraintImpulses()) / DT

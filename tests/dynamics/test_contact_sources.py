@@ -4,13 +4,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from sphshell_pin import CoulombFriction, RungeKutta4, Scene, SemiImplicitEuler, Simulation
+from sphshell_pin import RungeKutta4, Scene, SemiImplicitEuler, Simulation
 from sphshell_pin.errors import SphshellError
-from tests.models import add_body, ball, empty, free_q, linear_law, on_plate, pose_of
+from tests.models import FRICTION, LAW, add_body, ball, empty, free_q, linear_law, on_plate, pose_of
 
 RADIUS = 0.05
-LAW = linear_law(4000.0, 20.0)
-FRICTION = CoulombFriction(0.3, 0.1, 0.1, 1.0)
 
 
 def plate_points(pose_i: pin.SE3, pose_j: pin.SE3):

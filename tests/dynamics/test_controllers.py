@@ -7,7 +7,6 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import robots
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from sphshell_pin.dynamics.scene.joint_components import JointComponents
 from sphshell_pin.errors import InvalidParameter
 from tests import models
 from tests.results import assert_same_bits
@@ -62,9 +61,8 @@ def test_a_point_beside_the_frame_is_moved_as_a_frame_there() -> None:
     start = pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq))
 
     def end(name: str, **more) -> np.ndarray:
-        pressing = sp.CartesianImpedance(
-            name, PATH, 100.0, 10.0, 1.0, shell, rotational_stiffness=2.0, **more
-        )
+        more |= {"rotational_stiffness": 2.0}
+        pressing = sp.CartesianImpedance(name, PATH, 100.0, 10.0, 1.0, shell, **more)
         return sp.Simulation(scene, sp.RungeKutta4(1e-3)).run(start, None, 0.1, pressing).q[-1]
 
     np.testing.assert_array_equal(end(frame.name, offset=offset), end("beside"))
@@ -92,12 +90,9 @@ KP, KD = np.array([0.4, 0.3, 0.2]), np.array([0.02, 0.01, 0.01])
 def simulation(integrator=None, effort=None):
     finger = robots.load("three_link_finger")
     upright = pin.SE3(pin.rpy.rpyToMatrix(0.0, -np.pi / 2, 0.0), np.array([0.07, 0.0, 0.1]))
-    joints = JointComponents(effort={} if effort is None else {"knuckle": effort})
-    scene = sp.Scene(finger.model, joints=joints)
-    law = sp.HuntCrossleyLaw(1e6, 1.5, dissipation=2.0)
-    scene.add_contact(
-        sp.Sphere(0.010, "tip"), models.square(0.2), placement=upright, law=law, name="tip-wall"
-    )
+    joints = sp.JointComponents(effort={} if effort is None else {"knuckle": effort})
+    scene, law = sp.Scene(finger.model, joints=joints), sp.HuntCrossleyLaw(1e6, 1.5, 2.0)
+    scene.add_contact(sp.Sphere(0.010, "tip"), models.square(0.2), placement=upright, law=law)
     return sp.Simulation(scene, integrator or sp.RungeKutta4(2e-4))
 
 
@@ -147,13 +142,11 @@ def test_they_are_cut_to_the_limits_of_the_motors_and_zero_without_a_controller(
 
 
 def test_they_are_saved_and_known_to_rollouts_and_open_runs(tmp_path):
-    run = simulation()
-    result = run.run(Q0, duration=0.02, controller=pd(), record_dt=1e-3, record=["torque"])
+    run, given = simulation(), {"duration": 0.02, "record_dt": 1e-3, "record": ["torque"]}
+    result = run.run(Q0, controller=pd(), **given)
     loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(loaded.torque, result.torque)
-    rollout = run.rollout(
-        [Q0, Q0], duration=0.02, controller=pd(), record_dt=1e-3, record=["torque"]
-    )
+    rollout = run.rollout([Q0, Q0], controller=pd(), **given)
     np.testing.assert_array_equal(rollout[1].torque, result.torque)
     open_run = OpenRun(run, Q0, controller=pd(), record_dt=1e-3)
     first = open_run.advance(0.01)

@@ -192,9 +192,8 @@ def test_rates_of_bristles(where: str, friction: str, stretch: float) -> None:
     curved = where == "in a groove" or where in SURFACES
     turning = stretch * (30 if "rings" in friction else 1) if curved else 1e-6
     step = 1e-7 if where == "in a groove" else 1e-6
-    scenes.assert_rate_jacobian(
-        scene, q, v, scenes.stretched(scene, stretch), step=step, turning=turning
-    )
+    z = scenes.stretched(scene, stretch)
+    scenes.assert_rate_jacobian(scene, q, v, z, step=step, turning=turning)
 
 
 # A scene, its stretches [m], and how well its turning is known.

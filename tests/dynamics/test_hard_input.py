@@ -15,14 +15,7 @@ from sphshell_pin.study.fit.data import read_experiment
 from tests import meshes, models
 from tests.models import LAW, arm, ball, free_q, on_plate
 
-TIP = sp.Sphere(0.1, "tip")
-
-
-def ball_model(inertia=None) -> pin.Model:
-    model = models.empty()
-    inertia = inertia or pin.Inertia.FromSphere(1.0, 0.1)
-    models.add_body(model, "tip", pin.JointModelFreeFlyer(), inertia=inertia)
-    return model
+TIP = sp.Sphere(0.1, "ball")
 
 
 def test_a_ball_that_fills_a_faceted_socket_touches_every_facet() -> None:
@@ -51,9 +44,9 @@ def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
             raise KeyboardInterrupt
         return np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
 
-    scene, law = sp.Scene(ball_model()), sp.ImpactLaw(1e4, 1.5)
+    scene, law = sp.Scene(ball(radius=0.1)), sp.ImpactLaw(1e4, 1.5)
     scene.add_contact(TIP, sp.Shell(*meshes.grid_plate()), law=law, name="plate")
-    scene.add_contact_source(find, "tip", "universe", law, name="mine")
+    scene.add_contact_source(find, "ball", "universe", law, name="mine")
     q = models.free_q([0, 0, 0.099])
     with pytest.raises(Interrupted) as caught:
         sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(q, None, 1.0)
@@ -64,25 +57,24 @@ def test_an_interrupted_source_leaves_a_consistent_record(tmp_path) -> None:
 
 
 def test_a_joint_that_moves_no_mass_is_named() -> None:
-    scene = sp.Scene(ball_model(inertia=pin.Inertia.Zero()))
-    with pytest.raises(InvalidParameter, match=r"'tip_joint'.*moves no mass"):
+    model = ball()
+    model.inertias[1] = pin.Inertia.Zero()
+    scene = sp.Scene(model)
+    with pytest.raises(InvalidParameter, match=r"'ball_joint'.*moves no mass"):
         sp.Simulation(scene).run(pin.neutral(scene.model), None, 0.01)
     with pytest.raises(InvalidParameter, match="moves no mass"):
         scene.explain()
 
 
-def test_times_that_cannot_be_counted_are_refused() -> None:
-    scene = sp.Scene(ball_model())
-    q = pin.neutral(scene.model)
-    with pytest.raises(InvalidParameter, match="t0"):
-        sp.Simulation(scene).run(q, None, 0.01, t0=1e13)
-    rows = sp.Simulation(scene).run(q, None, 0.01, record_dt=1e9)
+def test_rows_farther_apart_than_the_run_is_long() -> None:
+    scene = sp.Scene(ball())
+    rows = sp.Simulation(scene).run(scene.neutral, None, 0.01, record_dt=1e9)
     assert rows.t.tolist() == [0.0, 0.01]
 
 
 def explained(sphere: sp.Sphere, shell: sp.Shell, model=None, **more) -> list[str]:
     """The warnings of the explanation of a contact."""
-    scene = sp.Scene(model or ball_model())
+    scene = sp.Scene(model or ball(radius=0.1))
     scene.add_contact(sphere, shell, law=models.LAW, **more)
     return scene.explain().warnings
 
@@ -91,23 +83,17 @@ def warned(words: str, *given, **more) -> bool:
     return any(words in one for one in explained(*given, **more))
 
 
-def test_one_sided_open_shells_are_warned_of() -> None:
-    assert warned("one-sided", TIP, sp.Shell(*meshes.grid_plate(), side="outside"))
-
-
-def test_a_radius_in_millimeters_is_suspected() -> None:
-    plate = sp.Shell(*meshes.grid_plate(), name="plate")
+def test_one_sided_open_shells_and_millimeters_taken_for_meters_are_warned_of() -> None:
+    vertices, elements = meshes.grid_plate()
+    plate = sp.Shell(vertices, elements)
+    assert warned("one-sided", TIP, sp.Shell(vertices, elements, side="outside"))
     with pytest.warns(UnitWarning, match="radius = 10 .* is more than the robot's reach"):
         assert warned("is it in mm?", sp.Sphere(10, "ball"), plate, models.arm())
-
-
-def test_millimeters_taken_for_meters_are_suspected() -> None:
-    vertices, elements = meshes.grid_plate()
     with pytest.warns(UnitWarning, match="'plate'.*unit='mm'"):
         assert warned("unit='mm'", TIP, sp.Shell(1000 * vertices, elements, name="plate"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        explained(TIP, sp.Shell(vertices, elements))
+        explained(TIP, plate)
 
 
 @pytest.mark.parametrize(
@@ -119,7 +105,7 @@ def test_millimeters_taken_for_meters_are_suspected() -> None:
     ],
 )
 def test_friction_that_creeps_visibly_is_warned_of(friction: sp.Friction, warns: bool) -> None:
-    given = sp.Sphere(0.01, "tip"), sp.Shell(*meshes.grid_plate())
+    given = sp.Sphere(0.01, "ball"), sp.Shell(*meshes.grid_plate())
     assert warned("creeps at 0.035 m/s", *given, friction=friction) == warns
     creep = friction.creep_speed
     assert creep == 0.0 or friction.coefficient(creep) == pytest.approx(0.4, rel=1e-12)
@@ -231,13 +217,6 @@ def read(force, **more):
 def test_data_that_cannot_be_computed_with_are_named() -> None:
     with pytest.raises(errors.DataError, match=r"row 1: 1e\+308 in column 'f \[N\]' is too large"):
         read([1.0, 1e308])
-    with pytest.raises(
-        errors.DataError, match=r"'f.sigma' must be positive .*too small to compute with"
-    ):
+    with pytest.raises(errors.DataError, match=r"'f.sigma' must be positive .*too small to comp"):
         read([1.0, 2.0], **{"f.sigma [N]": [1e-320] * 2})
     assert read(np.ma.masked_greater([1.0, 2.0], 1.5))[0].measured.tolist() == [1.0]
-
-
-def test_masked_elements_are_refused() -> None:
-    with pytest.raises(errors.InvalidShell, match="elements must not be masked"):
-        sp.Shell(np.eye(3), np.ma.masked_equal([[0, 1, 2]], 2))

@@ -12,11 +12,8 @@ import pytest
 from tests.programs import python
 from tests.texts import DATA
 
-ROOT = Path(__file__).parents[2]
-
 PROBE = """
-import ctypes, sys
-sys.path.insert(0, {root!r})
+import ctypes
 import numpy as np
 import sphshell_pin as sp
 from tests.models import ARM_Q, FRICTION, LAW, arm, on_plate, plate
@@ -74,8 +71,8 @@ SOME = [both for both in CASES if both[0] == "impedance" or both[1] == "Implicit
 def test_steps_do_not_touch_the_heap(counter: Path, cases: list[tuple[str, str]]) -> None:
     """A second more may cost a handful of calls (events grow), never one a step."""
     rows = ", ".join(f"({name!r}, {CONTROLLERS[name]}, sp.{one})" for name, one in cases)
-    probe = PROBE.format(root=str(ROOT), cases=rows)
-    done = python(probe, env={**os.environ, "LD_PRELOAD": str(counter)})
+    with_counter = {**os.environ, "LD_PRELOAD": str(counter)}
+    done = python(PROBE.format(cases=rows), cwd=DATA.parents[1], env=with_counter)
     assert done.returncode == 0, done.stderr
     for case, line in zip(cases, done.stdout.splitlines(), strict=True):
         first, short, long, steps, contact_time = line.split()

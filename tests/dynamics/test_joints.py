@@ -90,14 +90,14 @@ def test_a_damped_stop_throws_back_at_its_restitution(integrator) -> None:
 def test_a_top_without_torque_turns_as_the_closed_form_to_rounding() -> None:
     """Steps of so small turns that the chart of rotations is near its origin, by its series."""
     along, across = 2e-3, 1e-3
-    model = models.empty(gravity=0.0)
-    inertia = pin.Inertia(1.0, np.zeros(3), np.diag([across, across, along]))
+    model, moments = models.empty(gravity=0.0), np.array([across, across, along])
+    inertia = pin.Inertia(1.0, np.zeros(3), np.diag(moments))
     models.add_body(model, "top", pin.JointModelFreeFlyer(), inertia=inertia)
     w = np.array([7.0, 1.0, 7.0])
     q, v = models.free_q(np.zeros(3)), np.concatenate([np.zeros(3), w])
     result = models.run(sp.Scene(model), sp.RungeKutta4(9e-5), q, v, 0.3)
-    momentum, t = np.array([across, across, along]) * w, result.t[-1]
-    precession = pin.exp3(momentum / across * t)
+    t = result.t[-1]
+    precession = pin.exp3(moments * w / across * t)
     spin = pin.exp3(np.array([0.0, 0.0, (across - along) / across * w[2] * t]))
     turned = pin.Quaternion(result.q[-1][3:]).matrix()
     np.testing.assert_allclose(turned, precession @ spin, rtol=0, atol=2e-13)
@@ -335,28 +335,9 @@ def test_results_with_joints_are_saved_and_loaded(tmp_path: Path) -> None:
     assert loaded.events == result.events
 
 
-SWING = """
-title = "A link swings against its stop"
-[robot]
-urdf = "link.urdf"
-joints = ["limits", "damping"]
-start = { hinge = -0.9 }
-[[joint]]
-name = "hinge"
-damping = 0.05
-friction = 0.1
-stop = { type = "hunt-crossley", stiffness = 400.0, exponent = 1.0 }
-upper = 0.3
-[run]
-duration = 1.0
-[[knob]]
-key = "joint.hinge.friction"
-"""
-
-
 def test_a_scenario_states_joints(tmp_path: Path) -> None:
     (tmp_path / "link.urdf").write_text(URDF)
-    built = build(write(tmp_path, SWING))
+    built = build(write(tmp_path, text_of("scenarios/swinging_link.toml")))
     joints, law = built.scene.joints, sp.HuntCrossleyLaw(400.0, 1.0)
     assert joints.kinds() == ("limits", "damping", "friction")
     assert joints.damping == {"hinge": 0.05}

@@ -36,15 +36,11 @@ def disc(depth: float) -> float:
 
 def test_stiffness_of_equal_bodies() -> None:
     """Of one material 8 G* a is 4 G a / (2 - nu), and 16/3 G a^3 of two is 8/3 of one's."""
-    one = sp.MindlinFriction(0.5, 0.4, *RUBBER)
-    both = sp.MindlinFriction(0.5, 0.4, *RUBBER, *RUBBER)
-    for law in (one, both):
-        assert law.tangential_stiffness(0.01) == pytest.approx(
-            4 * shear(*RUBBER) * 0.01 / (2 - RUBBER[1]), rel=1e-14
-        )
-        assert law.torsional_stiffness(0.01) == pytest.approx(
-            8 / 3 * shear(*RUBBER) * 0.01**3, rel=1e-14
-        )
+    modulus = shear(*RUBBER)
+    expected = 4 * modulus * 0.01 / (2 - RUBBER[1]), 8 / 3 * modulus * 0.01**3
+    for law in (sp.MindlinFriction(0.5, 0.4, *RUBBER, *more) for more in ((), RUBBER)):
+        found = law.tangential_stiffness(0.01), law.torsional_stiffness(0.01)
+        assert found == pytest.approx(expected, rel=1e-14)
 
 
 def after(depth: float, motion: pin.Motion, time: float) -> tuple[pin.Force, pin.Force]:
@@ -156,9 +152,8 @@ def test_order_of_convergence(integrator, order: int, parts: bool, rings: int) -
     v = np.array([0.02, -0.03, 0.05 if parts else -0.5, 0.3, 0.2, 1.0])
     ends = []
     for steps in (40, 80, 160) if order == 1 else (20, 40, 80):
-        run = sp.Simulation(scene, integrator(0.006 / steps)).run(
-            models.free_q([0, 0, 0.05 - depth]), v, 0.006, record_dt=0.006 / steps
-        )
+        step, q = integrator(0.006 / steps), models.free_q([0, 0, 0.05 - depth])
+        run = sp.Simulation(scene, step).run(q, v, 0.006, record_dt=step.dt)
         heights = np.diff(run.q[:, 2])
         assert (heights > 0).all() if parts else (heights < 0).all()
         assert run.contacts.friction_force_world[-1, :2].any()
@@ -236,21 +231,24 @@ OVER_GROOVES = [
 ]
 
 
+def over_a_groove(angle: float, friction: sp.Friction, dissipation: float = 0.5) -> sp.Scene:
+    """A ball of radius 0.1 over a groove whose sides rise by `angle`."""
+    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
+    law = sp.HuntCrossleyLaw(3e5, 1.5, dissipation)
+    return models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
+
+
 @pytest.mark.parametrize(("friction", "degrees"), OVER_GROOVES)
 def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:  # type: ignore[no-untyped-def]
     """Where contacts split and merge; and Mindlin's friction gives nothing back."""
     given_back = 1e-6 if isinstance(friction, sp.MindlinFriction) else 1.0
     angle = math.radians(degrees)
-    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
-    law = sp.HuntCrossleyLaw(3e5, 1.5, 0.5)
-    scene = models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
+    scene = over_a_groove(angle, friction)
     height = 0.1 / math.cos(angle) + 0.02 * math.tan(angle) - 5e-4
+    q, v = models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0]
     jumps = []
     for record_dt in (2e-4, 2.5e-5):
-        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-            models.free_q([-0.02, 0.1, height]), [0.4, 0.03, -0.035, 0, 2, 5.0], 0.1,
-            record_dt=record_dt,
-        )  # fmt: skip
+        run = sp.Simulation(scene, sp.Adaptive(1e-8)).run(q, v, 0.1, record_dt=record_dt)
         assert np.bincount(run.contacts.row).max() > 1
         force = np.zeros((len(run.t), 3))
         np.add.at(force, run.contacts.row, run.contacts.friction_force_world)
@@ -263,13 +261,12 @@ def test_friction_is_continuous_over_a_groove(friction, degrees: float) -> None:
 def test_contacts_that_split_and_merge_share_one_bristle() -> None:
     """A ball that rolls over a groove while 1 N along it holds: each contact carries all of it."""
     angle, radius, dt = math.radians(1), 0.1, 1e-3
-    shell = sp.Shell(*meshes.v_groove(angle, size=2.0, cells=6))
-    friction, law = sp.BristleFriction(0.4, 0.3, 1e4), sp.HuntCrossleyLaw(3e5, 1.5, 0.0)
-    scene = models.on_shell(models.ball(radius=radius), shell, law, friction, radius=radius)
+    scene = over_a_groove(angle, sp.BristleFriction(0.4, 0.3, 1e4), 0.0)
     x = np.linspace(-0.004, 0.004, 100)
     z = radius / math.cos(angle) - 5e-4 + np.abs(x) * math.tan(angle)
-    state = scene.state(models.free_q([x[0], 0.1, z[0]]), np.zeros(6))
-    state.advance(models.free_q([x[0], 0.1, z[0]]), [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
+    start = models.free_q([x[0], 0.1, z[0]])
+    state = scene.state(start, np.zeros(6))
+    state.advance(start, [0.0, 0.1, 0.0, 0.0, 0.0, 0.0], dt)
     counts = []
     for k in range(1, len(x)):
         q, speed = models.free_q([x[k], 0.1, z[k]]), (x[k] - x[k - 1]) / dt
@@ -282,53 +279,28 @@ def test_contacts_that_split_and_merge_share_one_bristle() -> None:
     assert counts.count(3) > 20
 
 
-class Path:
-    """Force, moment and work along a motion of one contact, by the law's own rates."""
-
-    def __init__(self, friction: sp.MindlinFriction) -> None:
-        self.friction = friction
-
-    def at(self, z, depth: float, closing: float, slip, spin: float):  # type: ignore[no-untyped-def]
-        velocity = np.array([*slip, -closing])
-        law, friction = LAW._binding, self.friction._binding
-        rest = np.zeros(3)
-        return _core.contact_force(law, friction, depth, UP, velocity, spin, rest, z, R, 1e-5)
-
-    def run(self, times, depth, slip, spin):  # type: ignore[no-untyped-def]
-        """Work (n,) of friction on what moves the bodies; functions of time give value and rate."""
-
-        def rate(t: float, y):  # type: ignore[no-untyped-def]
-            value, closing = depth(t)
-            _, drag, moment, z_rate = self.at(y[:3], value, closing, slip(t), spin(t))
-            return [*z_rate, drag[:2] @ slip(t) + moment[2] * spin(t)]
-
-        out = [np.zeros(4)]
-        for begin, end in pairwise(times):
-            step = solve_ivp(rate, (begin, end), out[-1], rtol=1e-9, atol=1e-16, method="LSODA")
-            assert step.success
-            out.append(step.y[:, -1])
-        return np.array(out)
-
-
 def test_cycle_of_elata_and_berryman() -> None:
     """Slip at a high load, back at a low one: incremental laws gain (k_1 - k_2) s^2 / 2.
 
     Here the force falls with the load, and that energy is lost.
     """
-    high, low, shift = 4e-4, 1e-4, 1e-6
-    depths = [high, high, low, low, high]
-    slips = [0.0, shift, shift, 0.0, 0.0]
-
-    def leg(values: list[float], t: float) -> tuple[float, float]:
-        k = min(int(t), 3)
-        return values[k] + (t - k) * (values[k + 1] - values[k]), values[k + 1] - values[k]
-
-    path = Path(STICKS)
-    rows = path.run(
-        range(5), lambda t: leg(depths, t), lambda t: [leg(slips, t)[1], 0.0], lambda t: 0.0
-    )
+    high, low, shift, rest = 4e-4, 1e-4, 1e-6, np.zeros(3)
     k_1, k_2 = (STICKS.tangential_stiffness(disc(d)) for d in (high, low))
-    assert rows[1, 3] == pytest.approx(-k_1 * shift**2 / 2, rel=1e-6)
-    assert rows[3, 3] == pytest.approx(-(k_1 - k_2) * shift**2 / 2, rel=1e-6)
+    # Depth and slip at the corners; of each side the stretch at its end, and the work so far.
+    corners = np.array([[high, 0.0], [high, shift], [low, shift], [low, 0.0], [high, 0.0]])
+    ends = [np.zeros(4)]
+    for begin, end in pairwise(corners):
+        closing, slip = end - begin
+
+        def rate(t, y, depth=begin[0], closing=closing, slip=slip):  # type: ignore[no-untyped-def]
+            where = depth + t * closing, UP, np.array([slip, 0.0, -closing]), 0.0, rest, y[:3]
+            found = _core.contact_force(LAW._binding, STICKS._binding, *where, R, 1e-5)
+            return [*found[3], found[1][0] * slip]
+
+        side = solve_ivp(rate, (0.0, 1.0), ends[-1], rtol=1e-9, atol=1e-16, method="LSODA")
+        assert side.success
+        ends.append(side.y[:, -1])
+    assert ends[1][3] == pytest.approx(-k_1 * shift**2 / 2, rel=1e-6)
+    assert ends[3][3] == pytest.approx(-(k_1 - k_2) * shift**2 / 2, rel=1e-6)
     # Back at the start nothing is left: the force that the bodies took apart is gone.
-    assert np.abs(rows[-1, :3]).max() < 1e-6 * np.abs(rows[1, :3]).max()
+    assert np.abs(ends[4][:3]).max() < 1e-6 * np.abs(ends[1][:3]).max()

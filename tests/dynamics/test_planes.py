@@ -4,8 +4,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 import pytest
+import trimesh
 from scipy.optimize import brentq, curve_fit
-from scipy.spatial import ConvexHull
 
 import sphshell_pin as sp
 from sphshell_pin import testing
@@ -88,9 +88,7 @@ def test_a_sensor_and_rows_show_the_force_on_the_body_of_the_plane() -> None:
     rows = scene.contacts(q, v)
     place = pose_of(scene.model, q, "table")
     on_table = place.act(scene.external_forces(q, v)[1]).linear
-    assert rows.normal_force * rows.normal_world[0] + rows.friction_force_world[0] == pytest.approx(
-        on_table, rel=1e-12
-    )
+    assert rows.force_world[0] == pytest.approx(on_table, rel=1e-12)
 
 
 def test_an_egg_falls_and_is_an_event_of_touch() -> None:
@@ -129,10 +127,8 @@ def clipped(vertices: np.ndarray, edges: np.ndarray) -> tuple[float, np.ndarray]
     over = a[:, 2] * b[:, 2] < 0
     t = (a[over, 2] / (a[over, 2] - b[over, 2]))[:, None]
     points = np.vstack([vertices[vertices[:, 2] <= 0], a[over] + t * (b[over] - a[over])])
-    hull = ConvexHull(points)
-    tops, inside = hull.points[hull.simplices], hull.points[hull.vertices].mean(axis=0)
-    volumes = np.abs(np.linalg.det(tops - inside)) / 6
-    return volumes.sum(), volumes @ (tops.sum(axis=1) + inside) / 4 / volumes.sum()
+    part = trimesh.convex.convex_hull(points)
+    return part.volume, part.center_mass
 
 
 def edges_of(shell: sp.Shell) -> np.ndarray:
@@ -162,16 +158,12 @@ def test_the_force_is_that_of_the_volume_below_at_its_centroid(name: str) -> Non
 
 def test_the_cap_of_an_ellipsoid() -> None:
     """pi a b c t^2 (1 - t / 3), t the depth over the support; off as its curved elements are."""
-    axes, errors = np.array([0.03, 0.02, 0.025]), []
+    t, errors = 0.02, []
+    cap = KAPPA * np.pi * np.prod(EGG) * t**2 * (1 - t / 3)
     for cells in (8, 16):
-        scene, worst = scene_of(egg(cells, axes), ELASTIC), 0.0
-        for rotation in rotations(10, 1):
-            reach = support(axes, rotation)
-            t = 0.02
-            cap = KAPPA * np.pi * np.prod(axes) * t**2 * (1 - t / 3)
-            force = scene.contacts(pose(rotation, reach * (1 - t))).normal_force
-            worst = max(worst, abs(force[0] / cap - 1))
-        errors.append(worst)
+        scene = scene_of(egg(cells, EGG), ELASTIC)
+        poses = [pose(turn, support(EGG, turn) * (1 - t)) for turn in rotations(10, 1)]
+        errors.append(max(abs(scene.contacts(q).normal_force[0] / cap - 1) for q in poses))
     assert errors[1] < min(1e-3, 0.12 * errors[0])
 
 
@@ -188,7 +180,7 @@ def test_a_sheet_bears_by_its_area() -> None:
 
 SHELLS = {
     "box": box,
-    "egg": lambda: egg(10, np.array([0.03, 0.02, 0.025])),
+    "egg": lambda: egg(10, EGG),
     "sheet": lambda: sp.Shell(*grid_plate(2, 2, 0.05)),
 }
 
@@ -212,39 +204,16 @@ def test_derivatives_are_those_of_finite_differences(name, law, friction, ground
 SPUN = (0.1, 0, -0.2, 1.0, 2.0, 5.0)
 
 
-def thrown(shell: sp.Shell, inertia: pin.Inertia, law, friction):
-    """A free body over a level plane."""
-    return scene_of(shell, law, friction, inertia=inertia)
-
-
 def fallen(make, inertia, law, friction, integrator, *, v=SPUN, turn=(0.5, 0.3), **more):
     """Run of a body that begins 5 mm above the plane, turned."""
     shell, rotation = make(), pin.rpy.rpyToMatrix(*turn, 0.2)
     height = 0.005 - (shell.vertices @ rotation[2]).min()
     q = np.r_[0, 0, height, pin.Quaternion(rotation).coeffs()]
-    return run(thrown(shell, inertia, law, friction), integrator, q, np.array(v, float), **more)
-
-
-def assert_at_rest(result: sp.Result, steps: float) -> None:
-    """It lies still, the energies close, at an ordinary cost."""
-    assert result.stats.steps <= steps
-    assert np.abs(result.v[-1]).max() < 1e-6
-    assert np.abs(result.energy.residual).max() < 1e-6 * result.energy.exchanged
+    scene = scene_of(shell, law, friction, inertia=inertia)
+    return run(scene, integrator, q, np.array(v, float), **more)
 
 
 BOX = pin.Inertia.FromBox(0.2, 0.06, 0.05, 0.04)
-
-
-@pytest.mark.parametrize(
-    "friction", [sp.CoulombFriction(0.4, 0.4, 0.01, 0.1), sp.BristleFriction(0.4, 0.4, 1e4, 30.0)]
-)
-@pytest.mark.parametrize(
-    "integrator", [sp.Adaptive(1e-6, 1e-9), sp.Implicit(1e-6, 1e-9), sp.RungeKutta4(5e-5)]
-)
-def test_a_box_comes_to_rest_at_an_ordinary_cost(integrator, friction) -> None:
-    """It falls on a corner, tumbles, spins, and lies still; the energies close."""
-    law = sp.FoundationLaw(1e5, 1e-3, 10.0)
-    assert_at_rest(fallen(box, BOX, law, friction, integrator, duration=1.0), 20_000)
 
 
 def test_a_block_that_spins_on_its_face_is_slowed_by_the_moment_of_all_its_points() -> None:
@@ -253,11 +222,9 @@ def test_a_block_that_spins_on_its_face_is_slowed_by_the_moment_of_all_its_point
     x = [side * (np.arange(400) / 400 - 0.49875) for side in sides]
     lever = np.hypot(*np.meshgrid(*x)).mean()
     expected = mu * 9.81 * lever / (sides @ sides / 12)
-    for friction in (
-        sp.CoulombFriction(mu, mu, 1e-3, 1e-2),
-        sp.BristleFriction(mu, mu, 1e5, 140.0),
-    ):
-        scene = thrown(box(), BOX, sp.FoundationLaw(1e6, 1e-3), friction)
+    coulomb = sp.CoulombFriction(mu, mu, 1e-3, 1e-2)
+    for friction in (coulomb, sp.BristleFriction(mu, mu, 1e5, 140.0)):
+        scene = scene_of(box(), sp.FoundationLaw(1e6, 1e-3), friction, inertia=BOX)
         depth = 0.2 * 9.81 / (1e9 * np.prod(sides))
         q = np.array([0, 0, 0.02 - depth, 0, 0, 0, 1.0])
         result = sp.Simulation(scene, sp.Implicit(1e-6, 1e-9)).run(q, [0, 0, 0, 0, 0, 20.0], 0.3)
@@ -272,7 +239,7 @@ def test_a_cylinder_that_rolls_is_slowed_by_the_dissipation() -> None:
     radius, length, mass, b = 0.02, 0.06, 0.2, 100.0
     shell = sp.Shell.from_geometry(coal.Cylinder(radius, length), segments=48)
     law, inertia = sp.FoundationLaw(1e6, 1e-3, b), pin.Inertia.FromCylinder(mass, radius, length)
-    scene = thrown(shell, inertia, law, sp.BristleFriction(0.5, 0.5, 1e5, 30.0))
+    scene = scene_of(shell, law, sp.BristleFriction(0.5, 0.5, 1e5, 30.0), inertia=inertia)
     # N = kappa length 4/3 a depth, a^2 = 2 radius depth.
     depth = (mass * 9.81 / (1e9 * length * 4 / 3 * np.sqrt(2 * radius))) ** (2 / 3)
     turn = pin.utils.rotate("x", np.pi / 2)
@@ -301,7 +268,7 @@ def test_a_disc_spins_down_with_the_published_exponents(power: float, exponent: 
     inertia = pin.Inertia.FromCylinder(mass, radius, thickness)
     friction = sp.CoulombFriction(0.02, 0.02, 0.01, 0.1)
     law = sp.FoundationLaw(1e7, 1e-3, 10.0) if own else sp.FoundationLaw(1e8, 1e-3)
-    scene = thrown(shell, inertia, law, friction)
+    scene = scene_of(shell, law, friction, inertia=inertia)
     turn = pin.Quaternion(pin.utils.rotate("y", tilt)).coeffs()
     touch = radius * np.sin(tilt) + thickness / 2 * np.cos(tilt)
 

@@ -32,13 +32,8 @@ ELASTIC = {
 laws = pytest.mark.parametrize("law", ELASTIC | DAMPED)
 
 
-def falling(law: object, friction: object = None, gravity: float = 0.0) -> sp.Scene:
-    return models.on_plate(models.slider(gravity, MASS), law, friction)
-
-
-def block(law: object, friction: object) -> sp.Scene:
-    """A mass that slides but does not turn, at rest on a plate."""
-    return models.on_plate(models.block(mass=MASS), law, friction)
+def falling(law: object, gravity: float = 0.0) -> sp.Scene:
+    return models.on_plate(models.slider(gravity, MASS), law)
 
 
 def shortest(scene: sp.Scene, q: list[float], v: list[float]) -> float:
@@ -65,7 +60,7 @@ FRICTIONS = {
 def test_the_shortest_time_is_that_of_the_law_or_of_the_friction(law: str, friction: str) -> None:
     """At the larger of the depths of the start and of the impact, under the larger load."""
     slip = FRICTIONS[friction]
-    scene = block((ELASTIC | DAMPED)[law], slip)
+    scene = models.on_plate(models.block(mass=MASS), (ELASTIC | DAMPED)[law], slip)
     one = scene.pairs[0].plane_law
     for pressed in (0.0, 2e-3):
         load = max(MASS * 9.81, one.normal_force(pressed))

@@ -32,12 +32,14 @@ def ball_on_plate(friction=models.FRICTION, law=models.LAW) -> sp.Scene:
 
 def starts(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
-    q = np.array([models.free_q([x, y, R + 1e-3]) for x, y in rng.uniform(-0.2, 0.2, (count, 2))])
-    return q, rng.uniform(-0.5, 0.5, (count, 6))
+    q = [models.free_q([x, y, R + 1e-3]) for x, y in rng.uniform(-0.2, 0.2, (count, 2))]
+    return np.reshape(q, (count, 7)), rng.uniform(-0.5, 0.5, (count, 6))
 
 
-def slider_scene(law) -> sp.Scene:
-    return models.on_shell(models.slider(), models.plate(), law, name=PAIR)
+def sliding(integrator=None) -> sp.Simulation:
+    """A mass that slides up and down over a plate."""
+    scene = models.on_shell(models.slider(), models.plate(), models.LAW, name=PAIR)
+    return sp.Simulation(scene, integrator or sp.SemiImplicitEuler(1e-3))
 
 
 @every
@@ -86,7 +88,7 @@ def test_a_varied_run_is_that_of_the_scene_built_so() -> None:
 
 def test_controllers_of_ones_own_and_of_the_package() -> None:
     """A force that holds the weight, one short of it by a tenth, a PD controller, and none."""
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    simulation = sliding()
     pd = sp.JointPD(100.0, 20.0, q_ref=np.array([1.1]))
     given = [lambda *_: np.array([G]), lambda *_: np.array([0.9 * G]), None, pd]
     held = simulation.rollout([[1.0]] * 4, None, 0.2, controller=given)
@@ -100,8 +102,8 @@ def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
             raise ValueError("too high for me")
         return np.array([1e25 if q[0] > 1 else 0.0])
 
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
-    rollout = simulation.rollout([[0.5], [1.5], [2.5], [0.01], [0.6]], None, 0.1, controller=touchy)
+    starts = [[0.5], [1.5], [2.5], [0.01], [0.6]]
+    rollout = sliding().rollout(starts, None, 0.1, controller=touchy)
     assert list(rollout.failures) == [1, 2, 3]
     assert isinstance(rollout.failures[1], errors.SimulationDiverged)
     assert rollout.failures[1].t == rollout.t[1] < 0.1
@@ -117,10 +119,9 @@ def test_a_failed_run_is_noted_and_the_rest_kept() -> None:
 
 def test_controllers_are_checked_before_anything_runs() -> None:
     asked: list[float] = []
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
     controllers = [lambda t, q, v, contacts: asked.append(t)] * 199 + [sp.JointPD(-1.0, 1.0)]
     with pytest.raises(errors.InvalidParameter, match="controller of run 199"):
-        simulation.rollout(np.full((200, 1), 0.1), None, 0.01, threads=1, controller=controllers)
+        sliding().rollout(np.full((200, 1), 0.1), None, 0.01, threads=1, controller=controllers)
     assert not asked
 
 
@@ -133,8 +134,7 @@ def test_what_a_routine_raised_is_told_whole() -> None:
     def controller(t, q, v, contacts):  # type: ignore[no-untyped-def]
         raise faults[int(q[0])]
 
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
-    rollout = simulation.rollout([[0.5], [1.5], [2.5]], None, 0.01, controller=controller)
+    rollout = sliding().rollout([[0.5], [1.5], [2.5]], None, 0.01, controller=controller)
     told = [str(why).partition("its routine raised ")[2] for why in rollout.failures.values()]
     assert told == ["ValueError: one, File two, three", "Silent", "KeyboardInterrupt"]
 
@@ -157,8 +157,7 @@ def test_contact_sources_over_threads(friction) -> None:
     rollout = simulation.rollout(q0s, v0s, 0.02, threads=4, record_dt=5e-3)
     assert list(rollout.failures) == [1, 4]
     for run in (0, 2, 3, 5):
-        alone = simulation.run(q0s[run], v0s[run], 0.02, record_dt=5e-3)
-        assert_same_bits(rollout[run], alone)
+        assert_same_bits(rollout[run], simulation.run(q0s[run], v0s[run], 0.02, record_dt=5e-3))
 
 
 def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
@@ -168,16 +167,15 @@ def test_deep_starts_in_a_solid_are_seen_as_run_sees_them() -> None:
     simulation = sp.Simulation(scene, sp.Adaptive())
     rollout = simulation.rollout(q0s, None, 1e-3)
     assert list(rollout.failures) == [2, 3]
-    for run in (2, 3):
-        with pytest.raises(errors.DeepStart, match=re.escape(str(rollout.failures[run]))):
+    for run, failure in rollout.failures.items():
+        with pytest.raises(errors.DeepStart, match=re.escape(str(failure))):
             simulation.run(q0s[run], None, 1e-3)
 
 
 def test_a_law_too_weak_is_told_once() -> None:
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.Adaptive())
     laws = [sp.ImpactLaw(k, 1.0) for k in (1e6, 1e2, 1e2)]
     with pytest.warns(errors.WeakLawWarning, match="in 2 of 3 runs, the first of them run 1"):
-        simulation.rollout([R + 0.01], [-5.0], 0.05, vary={f"{PAIR}.law": laws})
+        sliding(sp.Adaptive()).rollout([R + 0.01], [-5.0], 0.05, vary={f"{PAIR}.law": laws})
 
 
 HIGH = [models.free_q([0, 0, 1])] * 3
@@ -222,15 +220,14 @@ def test_what_is_wrong_is_told_with_its_place(given, sentence) -> None:
     assert sentence in str(caught.value)
 
 
-def test_progress_grows_to_one() -> None:
+@pytest.mark.parametrize("count", [0, 30])
+def test_progress_grows_to_one(count: int) -> None:
     shares: list[float] = []
-    q0s, v0s = starts(30)
-    sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s, v0s, 0.2, progress=shares.append)
+    simulation = sp.Simulation(ball_on_plate(), sp.Adaptive())
+    rollout = simulation.rollout(*starts(count), 0.2, progress=shares.append)
+    assert len(rollout) == count
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
-    shares.clear()
-    sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(q0s[:0], None, progress=shares.append)
-    assert shares == [1.0]
 
 
 @pytest.mark.usefixtures("keyboard")
@@ -250,13 +247,12 @@ def test_ctrl_c_keeps_what_is_done() -> None:
     done = [run for run in range(400) if run not in rollout.failures]
     assert pressed
     assert 0 < len(done) < 400
-    alone = simulation.run(q0s[done[0]], v0s[done[0]], 0.2, record_dt=0.2)
-    assert_same_bits(rollout[done[0]], alone)
+    first = done[0]
+    assert_same_bits(rollout[first], simulation.run(q0s[first], v0s[first], 0.2, record_dt=0.2))
 
 
 def test_python_goes_on_meanwhile() -> None:
     """Another Python thread counts while the compiled runs hold no interpreter lock."""
-    q0s, v0s = starts(8)
     ticks: list[int] = []
     over = threading.Event()
 
@@ -268,7 +264,7 @@ def test_python_goes_on_meanwhile() -> None:
     thread = threading.Thread(target=count)
     thread.start()
     simulation = sp.Simulation(ball_on_plate(), sp.SemiImplicitEuler(2e-6))
-    rollout = simulation.rollout(q0s, v0s, 0.2, threads=1)
+    rollout = simulation.rollout(*starts(8), 0.2, threads=1)
     over.set()
     thread.join()
     # With the lock held it would tick once before each run and once after.
@@ -280,7 +276,7 @@ def test_memory_is_that_of_what_is_kept() -> None:
     def resident() -> float:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
-    simulation = sp.Simulation(slider_scene(models.LAW), sp.SemiImplicitEuler(1e-3))
+    simulation = sliding()
     simulation.rollout(np.full((500, 1), 0.1), None, 0.02, threads=2)
     before = resident()
     rollout = simulation.rollout(np.full((5000, 1), 0.1), None, 0.02, threads=2)
@@ -290,13 +286,12 @@ def test_memory_is_that_of_what_is_kept() -> None:
 
 def test_a_table_of_the_runs() -> None:
     pandas = pytest.importorskip("pandas")
-    q0s, v0s = starts(3)
     vary = {
         f"{PAIR}.law.stiffness": [1e5, 2e5, 3e5],
         f"{PAIR}.sphere.offset": np.zeros((3, 3)),
         f"{PAIR}.placement": [pin.SE3.Identity()] * 3,
     }
-    rollout = sp.Simulation(ball_on_plate()).rollout(q0s, v0s, 0.05, vary=vary)
+    rollout = sp.Simulation(ball_on_plate()).rollout(*starts(3), 0.05, vary=vary)
     table = rollout.to_dataframe()
     assert isinstance(table, pandas.DataFrame)
     assert table[f"{PAIR}.law.stiffness"].tolist() == [1e5, 2e5, 3e5]
@@ -305,11 +300,8 @@ def test_a_table_of_the_runs() -> None:
     assert table["failure"].tolist() == [""] * 3
 
 
-def test_no_runs_and_slices() -> None:
-    simulation = sp.Simulation(ball_on_plate(), sp.Adaptive())
-    assert len(simulation.rollout(np.empty((0, 7)), None, 0.1)) == 0
-    q0s, v0s = starts(3)
-    rollout = simulation.rollout(q0s, v0s, 0.01)
+def test_slices_but_no_copies() -> None:
+    rollout = sp.Simulation(ball_on_plate(), sp.Adaptive()).rollout(*starts(3), 0.01)
     assert [one.q[-1].tolist() for one in rollout[1:]] == rollout.q[1:].tolist()
     assert rollout[-1].t.tolist() == [0.0, 0.01]
     with pytest.raises(IndexError):

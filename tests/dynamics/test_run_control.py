@@ -145,17 +145,18 @@ def test_a_table_without_pandas_names_the_extra_that_brings_it(monkeypatch) -> N
 
 def test_save_and_load(tmp_path: Path) -> None:
     result = bouncing().run(*START, 0.1)
-    path = tmp_path / "run.npz"
-    result.save(path)
-    loaded = sp.Result.load(path)
+    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
     assert_same_bits(result, loaded)
     assert loaded.scene is None
     assert loaded.stats == result.stats
-    with pytest.raises(errors.ResultError):
-        sp.Result.load(tmp_path / "nothing.npz")
     (tmp_path / "text.npz").write_text("not an archive")
-    with pytest.raises(errors.ResultError):
-        sp.Result.load(tmp_path / "text.npz")
+    for wrong in ("nothing.npz", "text.npz"):
+        with pytest.raises(errors.ResultError):
+            sp.Result.load(tmp_path / wrong)
+
+
+def imaginary() -> Kept:
+    return Kept({}, {"a": np.ones(1, "c16")})
 
 
 def _with(result: sp.Result, part: str, **values: object) -> sp.Result:
@@ -175,12 +176,7 @@ def _with(result: sp.Result, part: str, **values: object) -> sp.Result:
         (lambda r: _with(r, "contacts", row=r.contacts.row + 10**6), "'contacts.row'.* is 1000"),
         (lambda r: _with(r, "stats", steps=0.5), "header.stats.steps"),
         (lambda r: _with(r, "stats", wall_time=1j), "complex is not JSON"),
-        (
-            lambda r: replace(
-                r, origin=Origin("s", {}, lambda: Kept({}, {"a": np.ones(1, "c16")}))
-            ),
-            "'kept.a' holds complex128",
-        ),
+        (lambda r: replace(r, origin=Origin("s", {}, imaginary)), "'kept.a' holds complex128"),
     ],
 )
 def test_what_load_would_refuse_is_not_written(tmp_path: Path, change, said: str) -> None:
@@ -212,12 +208,9 @@ def test_lock_equals_the_model_reduced_by_hand() -> None:
     assert_same_bits(a, b)
 
 
-LAW = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
-
-
 def test_what_is_kept_of_a_pair_goes_with_it() -> None:
-    scene = sp.Scene(models.ball())
-    scene.add_contact(sp.Sphere(0.006, "ball"), models.plate(), law=LAW, name="c")
+    law = sp.HuntCrossleyLaw(1e6, 1.5, 0.5)
+    scene = models.on_shell(models.ball(), models.plate(), law, radius=0.006, name="c")
     q = models.free_q([0.0, 0.0, 0.006])
     before = scene.explain(q).pairs[0]
     scene.replace_pair("c", law=sp.HuntCrossleyLaw(1e8, 1.5, 0.5))

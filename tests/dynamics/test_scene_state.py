@@ -157,17 +157,6 @@ def test_a_run_goes_on_from_a_row_with_the_same_bits(integrator, friction):
         assert rest.at(state.t) == state
 
 
-def test_states_are_kept_in_files(tmp_path):
-    scene, q, v = on_surface("bowl", LAW, STICKS)
-    sim = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4))
-    result = sim.run(q, v, 0.01, record=("state",))
-    read = sp.Result.load(result.save(tmp_path / "run.npz"))
-    assert read.at(0.005) == result.at(0.005)
-    assert read.at(0.005) != result.at(0.006)
-    again = sim.run(read.at(0.005), duration=0.005)
-    assert np.array_equal(again.q[-1], result.q[-1])
-
-
 def test_what_a_run_cannot_go_on_from_is_refused():
     scene, q, v = on_surface("bowl", LAW, STICKS)
     sim = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4))

@@ -1,6 +1,6 @@
 """Sensitivities of runs, through touches, against differences of whole runs."""
 
-from itertools import product
+from itertools import count, product
 
 import numpy as np
 import pinocchio as pin
@@ -149,26 +149,23 @@ def test_a_controller_of_the_users_own(integrator: str) -> None:
     case.check([f"{PAIR}.law.stiffness", "v0"])
 
 
+def touched(torque, integrator: str = "adaptive") -> Case:
+    """A light mass on a slide that falls on a plate, driven by torque(v, forces of contacts)."""
+    scene = models.on_shell(models.slider(9.81, 0.3), models.plate(1.0), HUNT)
+    more = {"controller": lambda t, q, v, contacts: np.array([torque(v, contacts.normal_force)])}
+    return Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], **more)
+
+
 @pytest.mark.parametrize("integrator", ["adaptive", "implicit"])
 def test_torques_that_jump_at_the_touch(integrator: str) -> None:
     """The acceleration jumps there; so do the derivatives of v."""
-    scene = models.on_shell(models.slider(9.81, 0.3), models.plate(1.0), HUNT)
-
-    def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
-        return np.array([4.0 + 2.0 * v[0] if len(contacts.depth) else 0.5])
-
-    case = Case(scene, [R + 0.004], [-0.3], 0.06, INTEGRATORS[integrator], controller=tau)
+    case = touched(lambda v, force: 4.0 + 2.0 * v[0] if len(force) else 0.5, integrator)
     case.check(["q0", "v0", "ball.law.stiffness", "ball.sphere.radius"], bounces=1)
 
 
 def test_torques_that_follow_a_force() -> None:
     """What a held state's force makes of a moved sphere and a moved shell."""
-    scene = models.on_shell(models.slider(9.81, 0.3), models.plate(1.0), HUNT)
-
-    def tau(t: float, q: Array, v: Array, contacts: sp.results.SceneContacts) -> Array:
-        return np.array([-0.2 * contacts.normal_force.sum()])
-
-    case = Case(scene, [R + 0.004], [-0.3], 0.06, controller=tau)
+    case = touched(lambda v, force: -0.2 * force.sum())
     case.check(["ball.sphere.offset", "ball.placement"], bounces=1)
 
 
@@ -190,23 +187,16 @@ def test_the_run_has_the_same_bits() -> None:
         assert other.sensitivities.q.tobytes() == again.sensitivities.q.tobytes()
 
 
-def test_a_controller_with_a_memory_is_refused() -> None:
-    asked = []
-
-    def counts(t: float, q: Array, v: Array, contacts: object) -> Array:
-        asked.append(t)
-        return 1e-3 * len(asked) + 0.0 * q
-
-    case = drop(IMPACT, duration=0.03, controller=counts, control_dt=1e-3)
-    with pytest.raises(InvalidParameter, match="controller"):
-        case.run(names=["v0"])
-    assert len(case.run().t) > 2
-
-
-def test_a_controller_that_reads_sensors_is_refused() -> None:
-    case = drop(IMPACT, controller=lambda t, q, v, contacts, sensors: 0.0 * q, control_dt=1e-3)
-    with pytest.raises(InvalidParameter, match="controller"):
-        case.run(names=["v0"])
+def test_controllers_with_a_memory_and_those_that_read_sensors_are_refused() -> None:
+    calls = count()
+    for tau in (
+        lambda t, q, v, contacts: 1e-3 * next(calls) + 0.0 * q,
+        lambda t, q, v, contacts, sensors: 0.0 * q,
+    ):
+        case = drop(IMPACT, duration=0.03, controller=tau, control_dt=1e-3)
+        with pytest.raises(InvalidParameter, match="controller"):
+            case.run(names=["v0"])
+        assert len(case.run().t) > 2
 
 
 def test_an_interrupted_run_has_those_of_its_rows() -> None:

@@ -9,10 +9,10 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import _core
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
+from sphshell_pin.errors import InvalidParameter, NameNotFound
 from sphshell_pin.scenario.running.run import write_sensors
 from tests import models
-from tests.results import assert_same_bits, damaged
+from tests.results import assert_same_bits
 from tests.texts import text_of
 
 BALL = "ball_joint"
@@ -75,9 +75,8 @@ def test_the_filter_misses_no_impact():
 def test_sensors_do_not_change_the_motion(integrator):
     friction = sp.BristleFriction(0.5, 0.4, 1e4, 10.0)
     scene = models.on_plate(models.arm(), sp.HuntCrossleyLaw(1e6, 1.5, 0.2), friction)
-    controller = sp.CartesianImpedance(
-        frame="ball", path=[(0.3, 0.1, 0.04), (0.35, 0.1, 0.04)], stiffness=900, damping=30
-    )
+    path = [(0.3, 0.1, 0.04), (0.35, 0.1, 0.04)]
+    controller = sp.CartesianImpedance("ball", path, 900.0, 30.0)
     sensors = [
         sp.ForceTorqueSensor(name="a", frame="two_joint", rate=700, cutoff=100, delay=1e-3),
         sp.ForceTorqueSensor(name="b", frame=BALL, rate=331, force_noise=1.0),
@@ -261,22 +260,6 @@ def two_sensors():
     return slider(sp.Adaptive(), sensors).run([0.0], None, 0.1, sine(5.0))
 
 
-def test_readings_are_saved_and_loaded(tmp_path):
-    result = two_sensors()
-    loaded = sp.Result.load(result.save(tmp_path / "run.npz"))
-    assert list(loaded.sensors) == ["wrist", "torque"]
-    for name, log in result.sensors.items():
-        other = loaded.sensors[name]
-        assert other.columns == log.columns
-        for part in ("t", "sampled", "values"):
-            assert np.array_equal(getattr(other, part), getattr(log, part))
-            assert not getattr(other, part).flags.writeable
-    plain = slider(sp.Adaptive(), []).run([0.0], None, 0.1)
-    assert sp.Result.load(plain.save(tmp_path / "plain.npz")).sensors == {}
-    with np.load(tmp_path / "plain.npz") as file:
-        assert not [name for name in file if name.startswith("sensors")]
-
-
 def test_readings_are_columns(tmp_path):
     result = two_sensors()
     columns = result.sensor_columns()
@@ -304,21 +287,6 @@ def test_readings_are_drawn():
     assert [len(axis.lines) for axis in figure.axes] == [3, 3, 1]
     empty = slider(sp.Adaptive(), []).run([0.0], None, 0.1).plot("sensors")
     assert empty.axes[0].texts[0].get_text() == "no sensors"
-
-
-@pytest.mark.parametrize(
-    ("name", "change", "said"),
-    [
-        ("sensors.values", lambda a: a[:-1], "its readings"),
-        ("sensors.sensor", lambda a: a + 1, "not from 0 to 1"),
-        ("sensors.t", lambda a: a[:-1], "'sensors.t' has the shape"),
-        ("sensors.t", lambda a: None, r"no array 'sensors\.t'"),
-    ],
-)
-def test_a_file_with_other_readings_is_refused(tmp_path, name, change, said):
-    file = two_sensors().save(tmp_path / "run.npz")
-    with pytest.raises(ResultError, match=said):
-        sp.Result.load(damaged(file, name, change))
 
 
 def splitmix(x):

@@ -35,9 +35,15 @@ def scene_of(spheres, *, together: bool, shell=None, model=None, **more) -> sp.S
     return scene
 
 
+def both(spheres, **more) -> tuple[sp.Scene, sp.Scene]:  # type: ignore[no-untyped-def]
+    """The scene of all spheres in one entry, and of an entry for each."""
+    together, alone = (scene_of(spheres, together=one, **more) for one in (True, False))
+    return together, alone
+
+
 def test_together_they_are_the_same_pairs() -> None:
     spheres = pad()
-    together, alone = (scene_of(spheres, together=one) for one in (True, False))
+    together, alone = both(spheres)
     assert [pair.side_i.sphere for pair in together.pairs] == spheres
     assert {pair.group for pair in together.pairs} == {"shell"}
     assert [pair.name for pair in together.pairs[:2]] == ["shell/ball-0", "shell/ball-1"]
@@ -53,11 +59,7 @@ def test_together_they_are_the_same_pairs() -> None:
 def test_no_contact_is_missed_at_the_border_of_the_shell(method: str) -> None:
     # A dome, which bulges over its flat elements: far, near its box, and in touch at its rim.
     shell = sp.Shell(*meshes.dome(6))
-    spheres = pad(4)
-    together, alone = (
-        scene_of(spheres, together=one, shell=shell, method=method, friction=None)
-        for one in (True, False)
-    )
+    together, alone = both(pad(4), shell=shell, method=method, friction=None)
     rng, (low, high), met = np.random.default_rng(0), shell.box, 0
     for _ in range(300):
         place = low + rng.uniform(-0.3, 1.3, 3) * (high - low)
@@ -77,8 +79,8 @@ def test_together_they_move_as_one_by_one(integrator) -> None:  # type: ignore[n
     # Falls, hits, tumbles.
     q, v = models.free_q([0.0, 0.0, 0.012]), np.array([0.3, 0.1, -0.5, 1.0, -2.0, 5.0])
     exact, ends = isinstance(integrator, sp.SemiImplicitEuler), []
-    for together in (True, False):
-        result = models.run(scene_of(pad(3), together=together), integrator, q, v, 0.05)
+    for scene in both(pad(3)):
+        result = models.run(scene, integrator, q, v, 0.05)
         assert sum(figures.touches for figures in result.stats.pairs.values()) > 3
         if not exact:
             testing.assert_energy_kept(result, 1e-5)
@@ -91,8 +93,7 @@ def test_contacts_that_begin_at_once_have_rings_of_their_own() -> None:
     friction = sp.MindlinFriction(0.3, 0.3, 1e6, 0.4, rings=4, torsional=True)
     spheres = [sp.Sphere(0.02, "ball", (x, 0.0, -0.03)) for x in (-0.02, 0.02)]
     q, v = models.free_q([0, 0, 0.055]), [0.3, 0.1, -0.5, 0.0, 0.0, 3.0]
-    for together in (True, False):
-        scene = scene_of(spheres, together=together, law=law, friction=friction)
+    for scene in both(spheres, law=law, friction=friction):
         result = models.run(scene, sp.RungeKutta4(1e-4), q, v, 0.2)
         assert result.stats.pairs[scene.pairs[0].name].touches > 0
         ends.append(np.concatenate([result.q[-1], result.v[-1]]))
@@ -114,13 +115,11 @@ def test_a_fast_pad_passes_through_nothing(integrator, speed: float) -> None:  #
 @pytest.mark.parametrize("integrator", [sp.SemiImplicitEuler(2e-5), sp.Adaptive(1e-7, 1e-9)])
 def test_more_contacts_begin_at_once_than_there_is_room_for(integrator) -> None:  # type: ignore[no-untyped-def]
     # 64 spheres land at the same instant, and hold on a slope of 0.3 with friction 0.6.
-    model = models.ball()
+    model, law = models.ball(), sp.HuntCrossleyLaw(1e5, 1.5, 5.0)
     model.gravity.linear = np.array([9.81 * np.sin(0.3), 0.0, -9.81 * np.cos(0.3)])
-    law = sp.HuntCrossleyLaw(1e5, 1.5, 5.0)
     scene = scene_of(pad(lift=0.0), together=True, model=model, law=law)
-    result = sp.Simulation(scene, integrator).run(
-        models.free_q([0, 0, R + 1e-4]), np.zeros(6), 0.4, record_dt=0.1
-    )
+    q = models.free_q([0, 0, R + 1e-4])
+    result = models.run(scene, integrator, q, duration=0.4, record_dt=0.1)
     assert [figures.touches > 0 for figures in result.stats.pairs.values()] == [True] * 64
     assert np.abs(result.v[-1]).max() < 1e-3
     assert abs(result.q[-1, 0] - result.q[-2, 0]) < 1e-6
@@ -141,10 +140,7 @@ def test_a_group_over_the_bulge_of_a_coarse_shell_is_not_far() -> None:
     radius = 0.25 * bulge
     spheres = [sp.Sphere(radius, "ball", tuple(0.1 * k * bulge * out)) for k in range(4)]
     more = {"law": sp.ImpactLaw(1e6, 1.0), "friction": None, "method": "smooth"}
-    together, alone = (
-        scene_of(spheres, together=one, shell=shell, model=models.block(), **more)
-        for one in (True, False)
-    )
+    together, alone = both(spheres, shell=shell, model=models.block(), **more)
     q = out * (1 + 0.5 * radius)
     found = together.contacts(q)
     assert len(found) == len(alone.contacts(q)) > 0

@@ -33,39 +33,11 @@ def one_step(scene, integrator, q, v, tau):
     return run.q[-1], run.v[-1]
 
 
-def assert_columns(got, end, moves, after, tolerance=1e-6):
-    """Every column relative to its largest entry, positions and velocities apart."""
-    nv = len(end[1])
-    known = differences.ROUNDING * np.array([1.0, max(1.0, float(np.abs(end[1]).max()))])
-    columns = {f"q.{k}": (got.by_state[:, k], 1e-2) for k in range(nv)}
-    columns |= {f"v.{k}": (got.by_state[:, nv + k], 1e-2 * DT) for k in range(nv)}
-    columns |= {f"tau.{k}": (got.by_tau[:, k], 0.0) for k in range(nv)}
-    # Along the surface a place may not matter, and rounding is that of the others.
-    places = [k for k, column in enumerate(got.parameters) if differences.is_place(column)]
-    among = 1e-2 * DT * float(np.abs(got.by_parameters[:, places]).max(initial=0.0))
-    for k, column in enumerate(got.parameters):
-        columns[column] = got.by_parameters[:, k], among if k in places else 0.0
-    wrong = {}
-    for (name, (column, floor)), part in product(columns.items(), (0, 1)):
-        moved, scale, ahead = moves[name]
-        # At its bound, 0, a number is differenced to one side.
-        bound = 10.0 * tolerance if ahead else tolerance
-        error = differences.off(
-            column[part * nv : (part + 1) * nv],
-            lambda x, moved=moved, part=part: after(*moved(x))[part],
-            scale,
-            floor=floor,
-            tolerance=bound,
-            known=float(known[part]),
-            ahead=ahead,
-        )
-        if not error <= bound:
-            wrong[f"{'qv'[part]} by {name}"] = error
-    assert not wrong
-
-
 def assert_step(scene, integrator, q, v):
-    """Compare the derivatives of a step with those of runs of one step."""
+    """Compare the derivatives of a step with those of runs of one step.
+
+    Every column relative to its largest entry, positions and velocities apart.
+    """
     model, nv = scene.model, scene.model.nv
     tau = np.random.default_rng(1).normal(size=nv)
     names = differences.names_of(scene)
@@ -82,7 +54,27 @@ def assert_step(scene, integrator, q, v):
         q, v = one_step(scene, integrator, q, v, tau)
         return np.asarray(pin.difference(model, end[0], q)), v - end[1]
 
-    assert_columns(got, end, differences.moves(scene, q, v, tau), after)
+    moves = differences.moves(scene, q, v, tau)
+    known = differences.ROUNDING * np.array([1.0, max(1.0, float(np.abs(end[1]).max()))])
+    blocks = {f"q.{k}": (got.by_state[:, k], 1e-2) for k in range(nv)}
+    blocks |= {f"v.{k}": (got.by_state[:, nv + k], 1e-2 * DT) for k in range(nv)}
+    blocks |= {f"tau.{k}": (got.by_tau[:, k], 0.0) for k in range(nv)}
+    # Along the surface a place may not matter, and rounding is that of the others.
+    places = [k for k, column in enumerate(columns) if differences.is_place(column)]
+    among = 1e-2 * DT * float(np.abs(got.by_parameters[:, places]).max(initial=0.0))
+    for k, column in enumerate(columns):
+        blocks[column] = got.by_parameters[:, k], among if k in places else 0.0
+    wrong = {}
+    for (name, (column, floor)), part in product(blocks.items(), (0, 1)):
+        moved, scale, ahead = moves[name]
+        # At its bound, 0, a number is differenced to one side.
+        bound = 1e-5 if ahead else 1e-6
+        limits = {"floor": floor, "tolerance": bound, "known": float(known[part]), "ahead": ahead}
+        f = lambda x, moved=moved, part=part: after(*moved(x))[part]  # noqa: E731
+        error = differences.off(np.split(column, 2)[part], f, scale, **limits)
+        if not error <= bound:
+            wrong[f"{'qv'[part]} by {name}"] = error
+    assert not wrong
     return got
 
 

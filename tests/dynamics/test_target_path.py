@@ -123,6 +123,12 @@ def test_paths_that_cannot_be_followed_are_refused() -> None:
         Curve.through(np.array([[0.0, 0, 0], [1e8, 0, 0]]), shell, spline=False)
 
 
+def arc(radius: float, count: int) -> np.ndarray:
+    """Points (count, 3) of three quarters of a circle."""
+    angles = np.linspace(0, 1.5 * np.pi, count)
+    return radius * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+
+
 def warnings_of(**more) -> str:
     scene = sp.Scene(models.arm())
     frame = scene.model.frames[scene.model.nframes - 1].name
@@ -137,17 +143,14 @@ def test_a_path_through_a_body_and_a_tight_bend_are_said() -> None:
     assert "path jumps by" in said
     assert "is on another side" in said
     assert warnings_of(path=[[0.1, 0.03, 0.0], [0.1, -0.03, 0.02]], shell=box, spline=True) == ""
-    angles = np.linspace(0, 1.5 * np.pi, 60)
-    ring = 0.002 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    ring = arc(0.002, 60)
     said = warnings_of(path=ring, spline=True, speed=0.5, acceleration=0.5)
     assert "bends so much that its target goes at 0.0" in said
     assert warnings_of(path=ring, spline=True, speed=0.5) == ""
 
 
 def test_a_spline_through_a_circle_is_one() -> None:
-    angles = np.linspace(0, 1.5 * np.pi, 40)
-    points = 0.2 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
-    curve = Curve.through(points, None, spline=True)
+    curve = Curve.through(arc(0.2, 40), None, spline=True)
     inner = np.linspace(0.1, 0.9, 50) * curve.length
     assert np.linalg.norm(curve.at(inner), axis=1) == pytest.approx(0.2, abs=1e-5)
     assert curve.length == pytest.approx(0.3 * np.pi, rel=1e-4)
@@ -216,9 +219,8 @@ def test_a_path_on_a_turning_carrier_is_followed_exactly() -> None:
     more |= {"acceleration": 0.5, "jerk": 5.0}
     rows, places, targets = follow(sp.Scene(model), "tip", q, v, **more)
     assert rows.q[-1, 0] == pytest.approx(1.5 * rate)
-    turned = [
-        pin.utils.rotate("z", angle) @ one for angle, one in zip(rows.q[:, 0], targets, strict=True)
-    ]
+    turns = (pin.utils.rotate("z", angle) for angle in rows.q[:, 0])
+    turned = [turn @ one for turn, one in zip(turns, targets, strict=True)]
     np.testing.assert_allclose(places, turned, atol=2e-6)
 
 
@@ -227,9 +229,8 @@ def test_the_push_turns_with_the_normal_along_a_piece() -> None:
     model, shell = models.empty(0.0), sp.Shell.from_geometry(coal.Sphere(0.4))
     models.add_body(model, "tip", pin.JointModelTranslation())
     path = [[0.4, 0.0, 0.0], [0.0, 0.4, 0.0]]
-    push = sp.CartesianImpedance(
-        "tip", path, 0.0, 0.0, normal_force=2.0, shell=shell, shell_frame="universe", speed=1.0
-    )
+    more = {"normal_force": 2.0, "shell": shell, "shell_frame": "universe", "speed": 1.0}
+    push = sp.CartesianImpedance("tip", path, 0.0, 0.0, **more)
     q, quarter = np.array([0.5, 0.0, 0.0]), 0.2 * np.pi
     end = sp.Simulation(sp.Scene(model), sp.Adaptive(1e-9)).run(q, None, quarter, push).v[-1]
     # The integral of 2 N times the normal, of a body of 1 kg.

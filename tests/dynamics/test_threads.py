@@ -3,17 +3,13 @@
 The programs run in processes of their own: what used to go wrong here killed the process.
 """
 
-from pathlib import Path
-
 import pytest
 
 from tests.programs import python
+from tests.texts import DATA
 
-ROOT = Path(__file__).parents[2]
-
-SETUP = f"""
+SETUP = """
 import collections, sys, threading, time
-sys.path.insert(0, {str(ROOT)!r})
 import numpy as np
 import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
@@ -41,7 +37,7 @@ def hammer(routines, seconds=0.5):
 
 
 def passes(program: str) -> None:
-    done = python(SETUP + program)
+    done = python(SETUP + program, cwd=DATA.parents[1])
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -158,7 +154,7 @@ lambda: [scene2.contacts(Q) for _ in range(10**7)],
 
 @pytest.mark.parametrize("calls", DAEMONS)
 def test_the_interpreter_ends_while_daemon_threads_compute(calls: str) -> None:
-    done = python(f"""{SETUP}
+    program = f"""{SETUP}
 sim, still = sp.Simulation(scene, sp.SemiImplicitEuler(1e-6)), lambda *state: np.zeros(6)
 scene2 = sp.Scene(ball())
 find = lambda i, j: ([[0, 0, 0]], [[0, 0, 1.0]], [1e-4])
@@ -167,5 +163,6 @@ for call in [{DAEMONS[calls]}]:
     threading.Thread(target=call, daemon=True).start()
 time.sleep(0.3)
 print("end")
-""")
+"""
+    done = python(program, cwd=DATA.parents[1])
     assert (done.returncode, done.stdout, done.stderr) == (0, "end\n", "")

@@ -7,11 +7,12 @@ import random
 import re
 import tempfile
 import zipfile
-from base64 import b64encode
 from collections.abc import Callable
 from pathlib import Path, PurePath
 
 import numpy as np
+import trimesh
+from trimesh.exchange.gltf import export_gltf
 
 from sphshell_pin import robots
 from sphshell_pin.scenario import build
@@ -76,26 +77,12 @@ def package_corpus() -> tuple[bytes, ...]:
 def mesh_corpus() -> tuple[bytes, ...]:
     solid = SHAPES[-1]()
     files = {suffix: write(solid) for suffix, write in WRITERS.values() if suffix in _BY_ROBOTS}
-    buffer = np.array(solid.vertices, "<f4").tobytes() + np.array(solid.faces, "<u2").tobytes()
-    uri = "data:application/octet-stream;base64," + b64encode(buffer).decode()
-    accessor = {"bufferView": 0, "componentType": 5126, "count": 5, "type": "VEC3"}
-    indices = {"bufferView": 1, "componentType": 5123, "count": 21, "type": "SCALAR"}
-    gltf = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}]}
-    gltf |= {
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "accessors": [{**accessor, "min": [0, 0, 0], "max": [1, 1, 1]}, indices],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": start, "byteLength": length}
-            for start, length in ((0, 60), (60, 42))
-        ],
-        "buffers": [{"uri": uri, "byteLength": 102}],
-    }
-    files |= {".dae": DAE.encode(), ".gltf": json.dumps(gltf).encode()}
+    scene = trimesh.Trimesh(np.array(solid.vertices, float), solid.faces, process=False).scene()
+    beside, whole = (export_gltf(scene, embed_buffers=embedded) for embedded in (False, True))
+    files |= {".dae": DAE.encode(), ".gltf": whole["model.gltf"]}
     files[".obj"] = b"mtllib mesh.mtl\n" + files[".obj"]
-    parts = {"mesh.mtl": b"newmtl a\nmap_Kd mesh.mtl\n", "mesh.bin": buffer}
-    beside = {"mesh.gltf": json.dumps(gltf).replace(uri, "mesh.bin").encode(), **parts}
-    made = [tables.pack({"robot.urdf": ROBOT.replace("MESH", "mesh.gltf").encode(), **beside})]
+    parts = {"mesh.mtl": b"newmtl a\nmap_Kd mesh.mtl\n"}
+    made = [tables.pack({"robot.urdf": ROBOT.replace("MESH", "model.gltf").encode(), **beside})]
     for suffix, data in files.items():
         for name, text in (("robot.urdf", ROBOT), ("robot.xml", MJCF)):
             robot = text.replace("MESH", f"mesh{suffix}")

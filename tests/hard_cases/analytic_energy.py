@@ -167,9 +167,8 @@ def on_turntable() -> Verdicts:
         friction = balls.bristle(0.3, 1e5)
         scene = balls.scene_of(models.square(), law, friction, model=model, frame="table")
         spin = SPIN * np.array([0.5, 0.5, math.sqrt(0.5)])
-        q0, v0 = balls.state(
-            [0.1, 0.0, balls.RADIUS - law.depth_at(balls.MASS * balls.GRAVITY)], np.zeros(3), spin
-        )
+        height = balls.RADIUS - law.depth_at(balls.MASS * balls.GRAVITY)
+        q0, v0 = balls.state([0.1, 0.0, height], np.zeros(3), spin)
         simulation = sp.Simulation(scene, integrator)
         result = simulation.run(np.append(q0, [1.0, 0.0]), np.append(v0, 6.0), 1.0)
         energy = result.energy.kinetic + result.energy.potential + result.energy.elastic

@@ -56,17 +56,14 @@ def undamped() -> Verdicts:
         depth = ((e + 1) * balls.MASS * speed**2 / (2 * law.stiffness)) ** (1 / (e + 1))
         duration = touch_time(e, depth, speed)
         tried = f"{title}, {speed:g} m/s"
-        for (what, formula, expected), seen in zip(
-            (
-                ("time of the touch", "gap / v", GAP / speed),
-                ("time in touch", "2 I depth / v", duration),
-                ("largest depth", "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth),
-                ("restitution", "1", 1.0),
-            ),
-            impact(law, speed, duration),
-            strict=True,
-        ):
-            yield compare(what, tried, formula, expected, seen, 1e-6)
+        laws = (
+            ("time of the touch", "gap / v", GAP / speed),
+            ("time in touch", "2 I depth / v", duration),
+            ("largest depth", "((e + 1) m v^2 / (2 k))^(1 / (e + 1))", depth),
+            ("restitution", "1", 1.0),
+        )
+        for (what, *expected), seen in zip(laws, impact(law, speed, duration), strict=True):
+            yield compare(what, tried, *expected, seen, 1e-6)
 
 
 def hops(stiffness: float, height: float, end: float, integrator: object) -> tuple[float, float]:
@@ -109,10 +106,8 @@ def by_tolerance(error, integrator, span, tried, law, unit):
     tolerances, name = np.geomspace(*span, 6), integrator.__name__
     errors = [error(integrator(float(rtol))) for rtol in tolerances]
     power = float(np.polyfit(np.log(tolerances), np.log(errors), 1)[0])
-    about, what = (
-        "error ~ rtol^p, p about 0.8 to 1, or better",
-        f"{name}, rtol {span[0]:g} to {span[1]:g}",
-    )
+    about = "error ~ rtol^p, p about 0.8 to 1, or better"
+    what = f"{name}, rtol {span[0]:g} to {span[1]:g}"
     yield Verdict.on(what, tried, about, ">= 0.8", power, max(0.0, 0.8 - power), 0.05)
     yield at_most(f"{name}({span[1]:g}){unit}", tried, law, errors[-1], 1e2 * span[1])
 

@@ -13,7 +13,7 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.dynamics import Result
 from sphshell_pin.study.report import swing
 from sphshell_pin.study.report.swing import GRAVITY, MASS, RADIUS
-from tests.rolling import PRECISE, RATIO, Ball, state, velocities
+from tests.rolling import PRECISE, STIFF, Ball, state, velocities
 
 __all__ = [
     "GRAVITY", "INERTIA", "MASS", "PRECISE", "RADIUS", "STIFF", "beta", "bristle", "event_times",
@@ -21,20 +21,9 @@ __all__ = [
 ]  # fmt: skip
 BALL = Ball(MASS, RADIUS)
 INERTIA = BALL.inertia
-# Stiffness of contacts whose depth should not count [N/m], and of bristles.
-STIFF = 1e7
 # What the module of these runs knows of any ball, for this one.
 beta, free_ball, scene_of = BALL.beta, BALL.model, BALL.scene
-
-
-def spring(stiffness: float = STIFF, ratio: float = RATIO) -> sp.ImpactLaw:
-    """Linear spring and dashpot; the dashpot is at its full strength almost from the touch on."""
-    return BALL.spring(stiffness, ratio)
-
-
-def bristle(mu: float, stiffness: float = STIFF, mass: float | None = None) -> sp.BristleFriction:
-    """Bristles of one coefficient; `mass` [kg] that they move: of a round ball 2/7 of its own."""
-    return BALL.bristle(mu, stiffness, mass)
+spring, bristle = BALL.spring, BALL.bristle
 
 
 def tilted(angle: float) -> pin.SE3:

@@ -12,6 +12,8 @@ import pinocchio as pin
 
 import sphshell_pin as sp
 from tests import models
+from tests.hard_cases import balls
+from tests.hard_cases.analytic_impact import touch_time
 from tests.hard_cases.verdict import Verdict, Verdicts, at_most, case, compare
 
 EPS = float(np.finfo(float).eps)
@@ -68,11 +70,8 @@ def settle_all(integrator: Any, gravity: float, start: float) -> Verdict:
 @case("balls of 1 mg to 100 kg on springs of 1e3 to 1e9 N/m")
 def stiffness_and_mass() -> Verdicts:
     stiff = (sp.Implicit(), sp.LinearlyImplicitEuler(1e-3))
-    yield from [
-        settle_all(integrator, gravity, start)
-        for integrator in stiff
-        for gravity, start in ((GRAVITY, 0.0), (GRAVITY, 0.9), (1e3 * GRAVITY, 0.9))
-    ]
+    for integrator, start in product(stiff, ((GRAVITY, 0.0), (GRAVITY, 0.9), (1e3 * GRAVITY, 0.9))):
+        yield settle_all(integrator, *start)
 
 
 def stacked_depths(upper: float, lower: float, integrator: Any) -> tuple[list[float], list[float]]:
@@ -86,10 +85,8 @@ def stacked_depths(upper: float, lower: float, integrator: Any) -> tuple[list[fl
         models.add_body(model, name, pin.JointModelPZ(), inertia=inertia)
     scene = sp.Scene(model)
     expected = [whole * GRAVITY / 1e6, upper * GRAVITY / 1e6]
-    for ball, frame, height, carried in (
-        ("low", "universe", 0.0, whole),
-        ("high", "low", 0.02, upper),
-    ):
+    stack = ("low", "universe", 0.0, whole), ("high", "low", 0.02, upper)
+    for ball, frame, height, carried in stack:
         law, top = damped(carried, 1e6, carried * GRAVITY / 1e6), np.array([0.0, 0.0, height])
         placed = pin.SE3(np.eye(3), top)
         scene.add_contact(sp.Sphere(0.01, ball), models.plate(0.2), frame, placed, law=law)
@@ -147,13 +144,11 @@ def bounce(radius: float, integrator: Any) -> tuple[float, float]:
     mass, depth = 4e3 / 3 * math.pi * radius**3, 0.05 * radius
     law = sp.ImpactLaw(1.25 * mass / depth**2.5, 1.5)
     scene = on_plate(models.slider(0.0, mass), law, radius)
-    form = 2 * depth * math.sqrt(math.pi) * math.gamma(1.4) / math.gamma(0.9)
-    result = sp.Simulation(scene, integrator).run(
-        np.array([1.01 * radius]), np.array([-1.0]), duration=0.02 * radius + 1.1 * form
-    )
+    form = touch_time(1.5, depth, 1.0)
+    duration = 0.02 * radius + 1.1 * form
+    result = sp.Simulation(scene, integrator).run([1.01 * radius], [-1.0], duration)
     touch, lift = (
-        next((e.t for e in result.events if e.kind == kind), math.nan)
-        for kind in ("touch", "lift_off")
+        next(iter(balls.event_times(result, kind)), math.nan) for kind in ("touch", "lift_off")
     )
     return float(result.v[-1, 0]), (lift - touch) / form
 

@@ -60,9 +60,8 @@ class Target:
         if not self.thin:
             return rng.dirichlet(np.ones(3)) @ vertices[rng.choice(elements)], along
         foot = np.array([*rng.uniform(-1, 1, 2), 0.0])
-        a, b, c = vertices[
-            elements[crossed(foot + [0, 0, 50], foot - [0, 0, 50], vertices[elements])[0]]
-        ]
+        element = crossed(foot + [0, 0, 50], foot - [0, 0, 50], vertices[elements])[0]
+        a, b, c = vertices[elements[element]]
         normal = np.cross(b - a, c - a)
         # Not so flat that it meets the border first.
         while abs(along[2]) < 0.5:
@@ -177,9 +176,8 @@ def flight(rng: np.random.Generator, target: Target, radius: float) -> tuple[Any
     while (gap := distances(touch[None], corners).min() - 1) > 1e-6:
         touch = touch + gap * along
     if not inside:
-        start = (
-            touch - max(rng.uniform(0.05, 4), rng.uniform(-2.5, 2.5) * speed * dt / radius) * along
-        )
+        ahead = max(rng.uniform(0.05, 4), rng.uniform(-2.5, 2.5) * speed * dt / radius)
+        start = touch - ahead * along
     mass = rng.uniform(1000, 8000) * 4 / 3 * np.pi * radius**3
     law, friction = law_of(rng, mass, speed, radius)
     turn = rng.normal(size=4)
@@ -235,11 +233,8 @@ def judge(impacts: list[Impact], name: str) -> Verdicts:
         gains.append(gain / (GAIN + share * step**order))
         depths.append(result.stats.pairs["impact"].max_depth / impact.radius)
     tried = f"{name}, {len(impacts)} impacts"
-    for law, wrong in (
-        ("none passes", passed),
-        ("none flies by untouched", lost),
-        ("every run ends, and finite", broken),
-    ):
+    found = {"none passes": passed, "none flies by untouched": lost}
+    for law, wrong in (found | {"every run ends, and finite": broken}).items():
         where = [f" (first: impact {k}, {impacts[k].target.name})" for k in wrong[:1]]
         yield at_most("fast spheres", tried, "".join([law, *where]), len(wrong), 0)
     yield at_most("fast spheres", tried, "energy gained, of what is allowed", max(gains), 1.0)

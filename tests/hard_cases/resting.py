@@ -71,10 +71,8 @@ def spiked() -> Verdicts:
 
     z = bisect(left, 0.5 * RADIUS, 0.8 * RADIUS)
     form = WEIGHT / (SPIKES * z / math.hypot(z, 0.6 * RADIUS))
-    damping, duration = (
-        math.sqrt(stiffness * MASS / SPIKES),
-        120 * math.sqrt(0.02 * RADIUS / GRAVITY),
-    )
+    damping = math.sqrt(stiffness * MASS / SPIKES)
+    duration = 120 * math.sqrt(0.02 * RADIUS / GRAVITY)
     start = [1e-4 * RADIUS, 2e-4 * RADIUS, z + 1e-3 * RADIUS]
     for integrator, method in WAYS:
         forces, height = rest(spikes(), stiffness, damping, start, duration, integrator, method)

@@ -104,9 +104,8 @@ def stretched(integrator: Any, start: float) -> tuple[float, float]:
     law, friction = sp.HuntCrossleyLaw(1e5, 1.0, 1.0), sp.CoulombFriction(0.3, 0.25, 0.005, 0.05)
     placed = {"placement": pin.SE3(np.eye(3), wall), "law": law, "friction": friction}
     scene.add_contact(sp.Sphere(RADIUS, "tip"), models.plate(0.3), **placed)
-    controller = sp.CartesianImpedance(
-        "tip", [[0.0, 0.0, 0.2]], stiffness=100.0, damping=1.0, joint_damping=0.01
-    )
+    gains = {"stiffness": 100.0, "damping": 1.0, "joint_damping": 0.01}
+    controller = sp.CartesianImpedance("tip", [[0.0, 0.0, 0.2]], **gains)
     simulation, q = sp.Simulation(scene, integrator), np.full(3, start)
     result = simulation.run(q, duration=0.5, controller=controller, record_dt=1e-3)
     energy = result.energy

@@ -99,15 +99,8 @@ class Case:
 CASES: Register[Case] = Register(
     "tests.hard_cases",
     (
-        "analytic_impact",
-        "analytic_rolling",
-        "analytic_surfaces",
-        "analytic_energy",
-        "impacts",
-        "under_stiff",
-        "extremes",
-        "resting",
-        "starts",
+        *("analytic_impact", "analytic_rolling", "analytic_surfaces", "analytic_energy"),
+        *("impacts", "under_stiff", "extremes", "resting", "starts"),
     ),
     Case,
 )

@@ -32,10 +32,10 @@ def main() -> int:
     begin, number, asked = time.perf_counter(), 0, 0
     total: Counter[str] = Counter()
     for verdict in of_files(options) if options.files else of_families(options):
-        counts = Counter({name: len(rows) for name, rows in verdict.found().items()})
+        counts = Counter({name: len(rows) for name, rows in verdict.faults.items()})
         found = ", ".join(f"{name} {count}" for name, count in counts.items())
         print(f"{verdict.part:60s} {verdict.spheres:6d}  {found}", flush=True)
-        for name, rows in verdict.found().items():
+        for name, rows in verdict.faults.items():
             for text in rows[: options.show]:
                 print(f"    {name} at {text}")
         number, asked, total = number + 1, asked + verdict.spheres, total + counts

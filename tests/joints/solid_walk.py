@@ -6,11 +6,9 @@ from pathlib import Path
 import numpy as np
 from OCP.STEPControl import STEPControl_Reader
 
-import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from tests.joints.trimmed import PERSISTENCE, Edge, Minima, TrimmedSolid
 from tests.joints.verdict import MM, Verdict, exact_elements
-from tests.parts.cad_mesh import Ints
 from tests.parts.occ import Rng, Solid
 
 RADII = 0.2, 8.0
@@ -40,12 +38,8 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> tuple[Array, Array]
     Their centers (n, 3) and radii (n,) [mm].
     """
     centers, radii = [], []
-    sides = [
-        (edge, k)
-        for edge in solid.edges
-        for k in range(len(edge.faces))
-        if all(solid.surfaces[f].kind for f in edge.faces)
-    ]
+    known = [edge for edge in solid.edges if all(solid.surfaces[f].kind for f in edge.faces)]
+    sides = [(edge, k) for edge in known for k in range(len(edge.faces))]
     sides += [(Edge(curve, 0.0, [row], [True], (0, 0)), 0) for row, curve in solid.seams]
     per = -(-count // max(len(sides), 1))
     for edge, k in sides:
@@ -72,7 +66,7 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> tuple[Array, Array]
         points = points - distance[:, None] * normal
         out = rng.choice([-1.0, 1.0], (per, 1))
         # The same side of the solid on both faces.
-        m = other.closest(points)[1] * _side(solid, edge, k)
+        m = other.closest(points)[1] * _side(edge)
         normal = (1 - lean) * normal + lean * m
         normal = normal / np.linalg.norm(normal, axis=1)[:, None]
         depth = r * np.exp(rng.uniform(*np.log(DEPTHS), per))
@@ -86,12 +80,12 @@ def spheres_of(solid: TrimmedSolid, count: int, rng: Rng) -> tuple[Array, Array]
     return at[kept], r[kept]
 
 
-def _side(solid: TrimmedSolid, edge: Edge, k: int) -> float:
-    """Whether the normals of both faces of an edge are on one side of the solid."""
-    if len(edge.faces) < 2:
-        return 1.0
-    # An edge is on the left of one face and on the right of the other if their normals agree.
-    return -1.0 if edge.left[0] == edge.left[1] else 1.0
+def _side(edge: Edge) -> float:
+    """Whether the normals of both faces of an edge are on one side of the solid.
+
+    If they agree, the edge is on the left of one face and on the right of the other.
+    """
+    return -1.0 if edge.left in ([True, True], [False, False]) else 1.0
 
 
 def judge_solid(shell, solid, name, centers, radii, digits, rough):
@@ -114,8 +108,8 @@ def judge_solid(shell, solid, name, centers, radii, digits, rough):
             if strict:
                 near = [here.points] if len(here.points) else []
                 places = np.concatenate([*near, found.points])
-                elements = [element, *(_elements_at(shell, p, rough) for p in places)]
-                if exact[np.concatenate(elements)].all():
+                beside = (shell.contacts(p * MM, rough * MM, "elements").element for p in places)
+                if exact[np.concatenate([element, *beside])].all():
                     break
         if fault:
             where = f"center {(center * MM).tolist()}, radius {r * MM}"
@@ -133,10 +127,6 @@ class Found:
     weights: Array
 
 
-def _elements_at(shell: sp.Shell, point: Array, radius: float) -> Ints:
-    return shell.contacts(point * MM, radius * MM, "elements").element
-
-
 def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str, str]:
     # Faces that are nearly tangent cross farther away than by what they miss each other.
     tolerance += 4 * truth.off
@@ -144,11 +134,8 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
     if not len(found.depths):
         return ("lost", f"depth {truth.depths.max()}") if sure.any() else ("", "")
     if not len(truth.depths):
-        return (
-            ("phantom", f"depth {found.depths.max()}")
-            if found.depths.max() > tolerance
-            else ("", "")
-        )
+        made_up = found.depths.max() > tolerance
+        return ("phantom", f"depth {found.depths.max()}") if made_up else ("", "")
     deepest, most = truth.depths.max(), found.depths.max()
     if most > deepest + tolerance:
         return "deep", f"{most} instead of {deepest}"
@@ -161,16 +148,13 @@ def _fault(truth: Minima, found: Found, r: float, tolerance: float) -> tuple[str
     # A closest point is worse determined than its distance.
     same = (apart <= tolerance) & (away <= NEAR * r + np.sqrt(r * tolerance))
     plus = found.weights > 0
-    if (sure & ~same[:, plus].any(axis=1)).any():
-        k = int(np.argmax(sure & ~same[:, plus].any(axis=1)))
+    for k in np.flatnonzero(sure & ~same[:, plus].any(axis=1)):
         return "missing", f"{truth.depths[k]} at {truth.points[k].tolist()}"
-    level = np.abs(found.depths[:, None] - found.depths) <= np.maximum(
-        tolerance, 1e-6 * found.depths
-    )
+    steps = np.abs(found.depths[:, None] - found.depths)
+    level = steps <= np.maximum(tolerance, 1e-6 * found.depths)
     if tolerance < 1e-6 * r:
         alone = plus & ~same.any(axis=0) & ~(level & (found.weights < 0)).any(axis=1)
-        if (alone & (found.depths > tolerance)).any():
-            k = int(np.argmax(alone & (found.depths > tolerance)))
+        for k in np.flatnonzero(alone & (found.depths > tolerance)):
             return "phantom", f"{found.depths[k]} at {found.points[k].tolist()}"
         for k in np.flatnonzero(truth.depths > tolerance).tolist():
             # The saddle between two that are nearly one is hardly shallower.

@@ -224,11 +224,8 @@ def d_shaft(radius: float, cut: float) -> Part:
     ends = radius * np.array([[np.cos(half), np.sin(half)], [np.cos(half), -np.sin(half)]])
     middle = np.zeros(2)
     back = np.array([-radius, 0.0])
-    pieces = (
-        Piece(ends[0], back, middle, np.pi - half),
-        Piece(back, ends[1], middle, np.pi - half),
-        Piece(ends[1], ends[0]),
-    )
+    arcs = Piece(ends[0], back, middle, np.pi - half), Piece(back, ends[1], middle, np.pi - half)
+    pieces = (*arcs, Piece(ends[1], ends[0]))
     return Part(f"d-shaft {radius:g} cut {cut:g}", pieces, 60.0)
 
 

@@ -46,9 +46,8 @@ class Surface:
         shape = getattr(self.adaptor, self.kind)()
         frame = shape.Position()
         self.point = np.array(frame.Location().Coord())
-        self.x, self.y, self.axis = (
-            np.array(one().Coord()) for one in (frame.XDirection, frame.YDirection, frame.Direction)
-        )
+        ways = frame.XDirection(), frame.YDirection(), frame.Direction()
+        self.x, self.y, self.axis = (np.array(way.Coord()) for way in ways)
         # The surface's own normal is du x dv.
         self.sense = 1.0 if frame.Direct() else -1.0
         if self.kind in ("Cylinder", "Sphere"):
@@ -95,9 +94,8 @@ class Surface:
             return np.column_stack([turn, z / np.cos(self.second)])
         if self.kind == "Sphere":
             return np.column_stack([turn, np.arctan2(z, np.hypot(x, y))])
-        return np.column_stack(
-            [turn, np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)]
-        )
+        tilt = np.mod(np.arctan2(z, np.hypot(x, y) - self.radius), 2 * np.pi)
+        return np.column_stack([turn, tilt])
 
     def state(self, uv: Array) -> int:
         """1 inside, 0 on the border, -1 outside."""

@@ -12,42 +12,35 @@ from tests.joints.trimmed import TrimmedSolid
 from tests.joints.verdict import MM
 from tests.oracle.cad import ExactShape
 
-PARTS = [
-    solids.disc(40.0, 0.2),
-    solids.disc(40.0, 0.5),
-    solids.disc(170.0, 3.7),
-    solids.disc(31.0, 0.89, 3.3e-4),
-    solids.disc(40.0, 2.0, -1e-2),
-    solids.disc(100.0, 0.085, -3.7e-5),
-    solids.pocket(96.0, 1.2, 0.06),
-    solids.pocket(64.0, 0.49, 0.46),
-    solids.shaft(16.0, 4.5, 5.8e-3),
-    solids.ring(69.0, 6.5),
-    solids.dome(17.0),
-    solids.cones(30.0, 0.3),
-    solids.cones(25.0, 0.02),
-    solids.cones(36.0, 0.4, 1.9),
-    solids.d_shaft(20.0, 0.1),
-    solids.d_shaft(17.0, 0.066),
-    solids.slot(40.0, 5.0),
-    solids.bar(40.0, 1.0, 3.0),
-    solids.bar(63.0, 0.12, 0.3),
-    solids.bar(27.0, 0.5, 2.2, 8.6e-4),
-]
+
+def parts(sizes) -> list[solids.Part]:
+    return [make(*one) for make, some in sizes.items() for one in some]
 
 
-MESHED = [
-    solids.cones(30.0, 0.3),
-    solids.cones(24.0, 0.400742, 0.64),
-    solids.shaft(5.2, 2.4, 1e-4),
-    solids.shaft(6.4, 2.1, -1.3e-4),
-    solids.disc(80.0, 0.14, 2.2e-5),
-    solids.pocket(63.0, 3.3, 0.2),
-    solids.pocket(100.0, 3.7, 1.3),
-    solids.pocket(42.0, 0.18, 2.9),
-]
-
-
+PARTS = parts(
+    {
+        solids.disc: [
+            *((40.0, 0.2), (40.0, 0.5), (170.0, 3.7), (31.0, 0.89, 3.3e-4), (40.0, 2.0, -1e-2)),
+            (100.0, 0.085, -3.7e-5),
+        ],
+        solids.pocket: [(96.0, 1.2, 0.06), (64.0, 0.49, 0.46)],
+        solids.shaft: [(16.0, 4.5, 5.8e-3)],
+        solids.ring: [(69.0, 6.5)],
+        solids.dome: [(17.0,)],
+        solids.cones: [(30.0, 0.3), (25.0, 0.02), (36.0, 0.4, 1.9)],
+        solids.d_shaft: [(20.0, 0.1), (17.0, 0.066)],
+        solids.slot: [(40.0, 5.0)],
+        solids.bar: [(40.0, 1.0, 3.0), (63.0, 0.12, 0.3), (27.0, 0.5, 2.2, 8.6e-4)],
+    }
+)
+MESHED = parts(
+    {
+        solids.cones: [(30.0, 0.3), (24.0, 0.400742, 0.64)],
+        solids.shaft: [(5.2, 2.4, 1e-4), (6.4, 2.1, -1.3e-4)],
+        solids.disc: [(80.0, 0.14, 2.2e-5)],
+        solids.pocket: [(63.0, 3.3, 0.2), (100.0, 3.7, 1.3), (42.0, 0.18, 2.9)],
+    }
+)
 WALKS = {
     **{part.name: (part.solid, 2000, False) for part in PARTS},
     **{f"STL {part.name}": (part.solid, 2000, True) for part in MESHED},
@@ -63,7 +56,7 @@ def test_no_sphere_is_lost_or_counted_twice(name, tmp_path):
     """STL files are in single precision; fillets of plates begin to cross, the tube bends on."""
     make, count, stl = WALKS[name]
     path = solids.write_step(make(), tmp_path / "part.step")
-    assert walk_file(path, name, count, np.random.default_rng(1), stl).found() == {}
+    assert walk_file(path, name, count, np.random.default_rng(1), stl).faults == {}
 
 
 @pytest.mark.parametrize("off", [-2e-7, 2e-7], ids=["cut", "apart"])
@@ -71,7 +64,7 @@ def test_planes_of_a_file_may_miss_the_fillets_beside_them(off, tmp_path):
     path = solids.write_step(rounded_box(np.random.default_rng(0)), tmp_path / "box.step")
     solids.shift_planes(path, off)
     verdict = walk_file(path, "box", 4000, np.random.default_rng(1))
-    assert verdict.found() == {}
+    assert verdict.faults == {}
 
 
 @pytest.mark.parametrize(
@@ -103,7 +96,7 @@ def test_a_chamfer_is_a_cone_whatever_its_triangles(part, tmp_path):
 @pytest.mark.parametrize("family", [one for one in BOXES if one != "random plate"])
 def test_no_contact_is_lost_or_made_up_at_corners(family, tmp_path):
     verdict = walk_part(family, tmp_path, np.random.default_rng(0), most=1000)
-    assert verdict.found() == {}
+    assert verdict.faults == {}
 
 
 @pytest.mark.parametrize("radii", [(0.38, 3.7), (1.5, 3.4), (2.4, 5.3)])

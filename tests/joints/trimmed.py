@@ -60,6 +60,12 @@ class Edge:
         tangents = np.array(rows)
         return points, tangents / np.linalg.norm(tangents, axis=1)[:, None]
 
+    def near(self, points: Array, reach: Any) -> Ints:
+        """Rows of points (n, 3) from which a place of the edge may be in reach."""
+        away = np.linalg.norm(points[:, None] - self.grid[1], axis=2).min(axis=1)
+        step = np.linalg.norm(np.diff(self.grid[1], axis=0), axis=1).max()
+        return np.flatnonzero(away < reach + step)
+
     def closest(self, centers: Array) -> tuple[Ints, Array, Array]:
         """Local minima of the distance of centers (n, 3): rows, parameters, and whether inside."""
         low, high = self.span
@@ -143,18 +149,14 @@ class TrimmedSolid:
                 if sum(edge.IsSame(other) for other in own) > 1:
                     self.seams.append((row, BRepAdaptor_Curve(edge)))
                     continue
-                left = edge.Orientation() != TopAbs_REVERSED
-                known = next((k for k, one in enumerate(shapes) if one.IsSame(edge)), None)
-                if known is not None:
-                    self.edges[known].faces.append(row)
-                    self.edges[known].left.append(left)
-                    continue
-                shapes.append(edge)
-                ends = (TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge))
-                numbers = [_number(places, vertex) for vertex in ends]
-                curve = BRepAdaptor_Curve(edge)
-                tolerance = BRep_Tool.Tolerance_s(edge)
-                self.edges.append(Edge(curve, tolerance, [row], [left], (numbers[0], numbers[1])))
+                known = _number(shapes, edge)
+                if known == len(self.edges):
+                    ends = (TopExp.FirstVertex_s(edge), TopExp.LastVertex_s(edge))
+                    numbers = [_number(places, vertex) for vertex in ends]
+                    curve, tolerance = BRepAdaptor_Curve(edge), BRep_Tool.Tolerance_s(edge)
+                    self.edges.append(Edge(curve, tolerance, [], [], (numbers[0], numbers[1])))
+                self.edges[known].faces.append(row)
+                self.edges[known].left.append(edge.Orientation() != TopAbs_REVERSED)
         for edge in self.edges:
             pair = [self.surfaces[k] for k in edge.faces]
             simple = edge.curve.GetType() in (GeomAbs_Line, GeomAbs_Circle)
@@ -163,9 +165,8 @@ class TrimmedSolid:
                 most = 10 * edge.tolerance
                 edge.crossing = Crossing.of(*pair, edge.grid[1], along, edge.closed, most)
         self.vertices = np.array([BRep_Tool.Pnt_s(one).Coord() for one in places]).reshape(-1, 3)
-        self.size = float(
-            np.linalg.norm(np.ptp(np.concatenate([e.grid[1] for e in self.edges]), 0))
-        )
+        drawn = np.concatenate([edge.grid[1] for edge in self.edges])
+        self.size = float(np.linalg.norm(np.ptp(drawn, axis=0)))
         free = [one.samples(1.0) for one in self.surfaces if not one.kind]
         self.free = np.concatenate(free) if free else np.zeros((0, 3))
 
@@ -222,9 +223,7 @@ class TrimmedSolid:
         # It is off within the tolerance of any edge, also beside the end of another one.
         most = max([BESIDE_EDGE, *(10 * edge.tolerance for edge in own)])
         for edge in own if len(points) else []:
-            reach = np.linalg.norm(points[:, None] - edge.grid[1], axis=2).min(axis=1)
-            step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
-            rows = np.flatnonzero(reach < step + most)
+            rows = edge.near(points, most)
             if not len(rows):
                 continue
             which, on, tangents, inside = self._nearest(edge, points[rows])
@@ -241,9 +240,7 @@ class TrimmedSolid:
                         states[rows[k]] = 0 if abs(within[k]) < 1e-9 else np.sign(within[k])
 
     def _on_edge(self, edge: Edge, centers: Array, radii: Array, found: Any, passes: Any) -> None:
-        reach = np.linalg.norm(centers[:, None] - edge.grid[1], axis=2).min(axis=1)
-        step = np.linalg.norm(np.diff(edge.grid[1], axis=0), axis=1).max()
-        rows = np.flatnonzero(reach < radii + step)
+        rows = edge.near(centers, radii)
         if not len(rows):
             return
         which, points, tangents, inside = self._nearest(edge, centers[rows])
@@ -268,9 +265,8 @@ class TrimmedSolid:
             if distance[k] < radii[row] + (off if simple else 0.0):
                 passes[row].append((radii[row] - distance[k], off if simple else 0.0))
                 if distance[k] < radii[row] and least[k] > -1e-6:
-                    found[row].append(
-                        (points[k], radii[row] - distance[k], bool(least[k] > 1e-6), False, off)
-                    )
+                    depth, sure = radii[row] - distance[k], bool(least[k] > 1e-6)
+                    found[row].append((points[k], depth, sure, False, off))
 
     def _nearest(self, edge: Edge, centers: Array) -> tuple[Ints, Array, Array, Array]:
         """Rows of centers, the closest points of an edge, tangents, and whether inside it."""
@@ -309,9 +305,8 @@ class TrimmedSolid:
                     passes[row].append((depth, max(off[k], spread[k])))
 
 
-def _number(places: list[Any], vertex: Any) -> int:
-    for k, place in enumerate(places):
-        if place.IsSame(vertex):
-            return k
-    places.append(vertex)
-    return len(places) - 1
+def _number(known: list[Any], shape: Any) -> int:
+    """Return the place of a vertex or edge in a list, to which a new one is added."""
+    if not any(shape.IsSame(one) for one in known):
+        known.append(shape)
+    return next(k for k, one in enumerate(known) if shape.IsSame(one))

@@ -31,10 +31,6 @@ class Verdict:
     spheres: int
     faults: defaultdict[str, list[str]] = field(default_factory=lambda: defaultdict(list))
 
-    def found(self) -> dict[str, list[str]]:
-        """Faults, with a description of each sphere."""
-        return dict(self.faults)
-
 
 def exact_share(shell: sp.Shell) -> float:
     """The share of the area of a shell's faces on which contacts are exact."""

@@ -14,15 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.oracle.geometry import (
-    Array,
-    closest_on_triangles,
-    cross,
-    dot,
-    feature_normal,
-    gaps,
-    norm,
-)
+from tests.oracle import geometry
+from tests.oracle.geometry import Array, closest_on_triangles, cross, dot, gaps, norm
 
 # All relative to the size of the problem (largest coordinate met): on the same point, must, may.
 SAME_POINT = 1e-9
@@ -94,14 +87,8 @@ def _touch(center, point, elements, *, sure, depth, group=0, normal=None) -> Tou
     away = center - point
     if normal is None:  # undefined, here zero, where the center lies on the surface
         normal = away / norm(away) if norm(away) > 0 else away
-    return Touch(
-        np.asarray(point, dtype=float),
-        np.asarray(normal, dtype=float),
-        float(depth),
-        frozenset(int(e) for e in elements),
-        sure,
-        group,
-    )
+    point, normal = (np.asarray(one, dtype=float) for one in (point, normal))
+    return Touch(point, normal, float(depth), frozenset(map(int, elements)), sure, group)
 
 
 def facets(
@@ -115,7 +102,7 @@ def facets(
     if side != "both":
         sign = 1.0 if side == "outside" else -1.0
         nearest = points[distances.argmin()]
-        outward = sign * feature_normal(nearest, corners, SAME_POINT * size)
+        outward = sign * geometry.feature_normal(nearest, corners, SAME_POINT * size)
         if dot(center - nearest, outward) < 0:
             distance = distances.min()
             if distance >= radius:
@@ -140,7 +127,7 @@ def facets(
         possible = possible or _some_nudge_holds(center, point, nudges, near, size)
         sure = certain and bool(norm(away) < radius - EDGE_OF_REACH * size)
         if side != "both" and possible:
-            lift = dot(away, sign * feature_normal(point, corners, SAME_POINT * size))
+            lift = dot(away, sign * geometry.feature_normal(point, corners, SAME_POINT * size))
             sure &= bool(lift > DOUBTFUL * size)
             possible &= bool(lift > -DOUBTFUL * size)
         if possible:

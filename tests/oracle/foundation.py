@@ -79,12 +79,8 @@ def energy_in_box(low: Array, high: Array, center: Array, radius: float, count: 
     cosine, weights = np.polynomial.legendre.leggauss(count)
     turn = 2 * np.pi * (np.arange(2 * count) + 0.5) / (2 * count)
     sine = np.sqrt(1 - cosine**2)
-    u = np.stack(
-        np.broadcast_arrays(
-            sine[:, None] * np.cos(turn), sine[:, None] * np.sin(turn), cosine[:, None]
-        ),
-        axis=2,
-    )
+    across = sine[:, None, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    u = np.dstack([across, np.tile(cosine, (2 * count, 1)).T])
     with np.errstate(divide="ignore"):
         t = np.stack([(low - center) / u, (high - center) / u])
     enter = np.clip(t.min(axis=0).max(axis=2), 0, radius)

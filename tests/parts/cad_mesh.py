@@ -1,6 +1,5 @@
 """Triangles of a solid's faces as OpenCASCADE meshes them, with what CAD knows of each."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,13 +57,8 @@ class CadMesh:
 
     @property
     def areas(self) -> Array:
-        return np.asarray(np.linalg.norm(area_vectors(self.vertices, self.triangles), axis=1))
-
-
-def area_vectors(vertices: Array, triangles: Ints) -> Array:
-    """Normals (t, 3), as long as the triangles have area."""
-    corners = vertices[triangles]
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+        doubled = raw.area_vectors(self.vertices[self.triangles])
+        return np.asarray(np.linalg.norm(doubled, axis=1) / 2)
 
 
 def meshed_faces(solid: Solid, deflection: float, angle: float) -> list[Face]:
@@ -103,26 +97,19 @@ def joined(found: list[Face]) -> CadMesh:
     size = np.linalg.norm(np.ptp(points, axis=0))
     cells = np.round(points / (1e-8 * size))
     _, first, place = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    rows = np.concatenate(list(_rows_of(found)))
-    triangles = place.ravel()[rows]
+    starts = np.cumsum([0, *(len(face.mesh.points) for face in found)]).tolist()
+    rows = [face.mesh.triangles[:, _turn(face)] + k for face, k in zip(found, starts, strict=False)]
+    triangles = place.ravel()[np.concatenate(rows)]
     there = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     count = [len(face.mesh.triangles) for face in found]
+    normals = np.concatenate([face.mesh.corner_normals()[:, _turn(face)] for face in found])
     return CadMesh(
         vertices=points[first],
         triangles=triangles[there],
         face=np.repeat(np.arange(len(found)), count)[there],
         kind=np.repeat([KINDS.index(face.kind) for face in found], count)[there],
-        normals=np.concatenate([face.mesh.corner_normals()[:, _turn(face)] for face in found])[
-            there
-        ],
+        normals=normals[there],
     )
-
-
-def _rows_of(found: list[Face]) -> Iterator[Ints]:
-    start = 0
-    for face in found:
-        yield face.mesh.triangles[:, _turn(face)] + start
-        start += len(face.mesh.points)
 
 
 def _turn(face: Face) -> list[int]:

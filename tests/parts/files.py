@@ -11,7 +11,8 @@ import numpy as np
 import trimesh
 
 from sphshell_pin.base.arrays import Array
-from tests.parts.cad_mesh import CadMesh, Ints, area_vectors
+from sphshell_pin.shell.raw import area_vectors
+from tests.parts.cad_mesh import CadMesh, Ints
 from tests.parts.occ import Rng
 
 Written = tuple[Path, Ints]
@@ -49,22 +50,16 @@ def decimated_stl(folder: Path, mesh: CadMesh, rng: Rng) -> Written:
     vertices, triangles = simplify(
         mesh.vertices, mesh.triangles.astype(np.int32), 1.0 - left, agg=PATIENCE
     )
-    path = _exported(folder / "part.stl", vertices, triangles)
-    return path, np.full(len(triangles), -1)
+    return _exported(folder / "part.stl", vertices, triangles), np.full(len(triangles), -1)
 
 
 def averaged_ply(folder: Path, mesh: CadMesh, rng: Rng) -> Written:
     """Normals at the vertices, the mean of all triangles around by area, across sharp edges too."""
     normals = np.zeros_like(mesh.vertices)
-    vectors = area_vectors(mesh.vertices, mesh.triangles)
-    np.add.at(normals, mesh.triangles.ravel(), np.repeat(vectors, 3, axis=0))
+    np.add.at(normals, mesh.triangles, area_vectors(mesh.vertices[mesh.triangles])[:, None])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
     path = folder / "part.ply"
-    whole = trimesh.Trimesh(
-        mesh.vertices, mesh.triangles, vertex_normals=normals, process=False, validate=False
-    )
-    whole.export(path, vertex_normal=True)
-    return path, _all(mesh)
+    return _exported(path, mesh.vertices, mesh.triangles, vertex_normals=normals), _all(mesh)
 
 
 def exact_obj(folder: Path, mesh: CadMesh, rng: Rng) -> Written:
@@ -92,8 +87,9 @@ def _all(mesh: CadMesh) -> Ints:
     return np.arange(len(mesh.triangles))
 
 
-def _exported(path: Path, vertices: Array, triangles: Ints) -> Path:
-    trimesh.Trimesh(vertices, triangles, process=False, validate=False).export(path)
+def _exported(path: Path, vertices: Array, triangles: Ints, **normals: Array) -> Path:
+    whole = trimesh.Trimesh(vertices, triangles, process=False, validate=False, **normals)
+    whole.export(path, **({"vertex_normal": True} if normals else {}))
     return path
 
 

@@ -1,4 +1,7 @@
-"""What one file of a part costs: errors of distances, and of forces on planes."""
+"""What one file of a part costs: errors of distances, and of forces on planes.
+
+It is judged at places beside the solid, and by spheres that touch one plane of it.
+"""
 
 import time
 from dataclasses import dataclass
@@ -9,10 +12,12 @@ import numpy as np
 
 from sphshell_pin import ImpactLaw, Shell
 from sphshell_pin.base.arrays import Array
-from tests.parts.cad_mesh import MM, CadMesh, Ints, coarse_enough, joined, meshed_faces
+from sphshell_pin.shell.raw import area_vectors
+from tests.oracle.cad import ExactShape
+from tests.parts.cad_mesh import KINDS, MM, CadMesh, Ints, coarse_enough, joined, meshed_faces
 from tests.parts.files import KINDS_OF_FILE
+from tests.parts.occ import Rng, Solid
 from tests.parts.solids import random_solid
-from tests.parts.truth import Places, Touches, places_beside, touches_of
 
 METHODS = ("smooth", "facets")
 LAW = ImpactLaw(1.0, exponent=1.5)
@@ -40,6 +45,68 @@ PLANE_MARGIN = 0.01
 
 SPOILED = 0.02
 """A file whose flat elements are farther from the solid, over the size, is left out."""
+
+OFFSETS = 5e-4, 1e-2
+"""Of places from the surface, over the size, outside and inside."""
+
+SPHERES = 0.05, 0.02, 0.01, 0.005
+"""Of spheres, over the size; the largest that touches nothing but its plane is taken."""
+
+DEPTHS = 2e-5, 1e-4
+"""Of spheres in planes, over the size."""
+
+
+@dataclass(frozen=True)
+class Places:
+    """Points (n, 3) beside the surface and their distances (n,) from it [mm]."""
+
+    points: Array
+    distances: Array
+
+
+@dataclass(frozen=True)
+class Touches:
+    """Spheres that touch one planar face: centers (n, 3), radii (n,), exact depths (n,) [mm]."""
+
+    centers: Array
+    radii: Array
+    depths: Array
+
+
+def places_beside(solid: Solid, size: float, count: int, rng: Rng) -> Places:
+    """Return up to `count` places in random directions from random points of the faces."""
+    exact = ExactShape(solid, meters=1.0)
+    on = exact.samples(count, rng)
+    away = rng.normal(size=on.shape)
+    far = size * np.exp(rng.uniform(*np.log(OFFSETS), (len(on), 1)))
+    away *= far / np.linalg.norm(away, axis=1, keepdims=True)
+    return Places(on + away, exact.distances(on + away))
+
+
+def touches_of(mesh: CadMesh, count: int, rng: Rng, clear: float) -> Touches:
+    """Return up to `count` spheres that touch a plane, each by more than `clear` nothing else.
+
+    mesh : a fine one; clear : largest distance of a mesh from the faces [mm]
+    """
+    # In meters for the shell, which only has to find what is near.
+    shell = Shell(mesh.vertices, mesh.triangles, crease_angle=0.0, side="both", faces=False)
+    planes = np.unique(mesh.face[mesh.kind == KINDS.index("plane")])
+    rows = []
+    for k in rng.permutation(np.resize(planes, count)).tolist() if len(planes) else []:
+        own = np.flatnonzero(mesh.face == k)
+        row = rng.choice(own, p=mesh.areas[own] / mesh.areas[own].sum())
+        corners = mesh.vertices[mesh.triangles[row]]
+        at = rng.dirichlet((1.0, 1.0, 1.0)) @ corners
+        (normal,) = area_vectors(corners[None]) / (2 * mesh.areas[row])
+        depth = mesh.size * np.exp(rng.uniform(*np.log(DEPTHS)))
+        for radius in mesh.size * np.array(SPHERES):
+            center = at + (radius - depth) * normal
+            near = shell.contacts(center, radius + clear, "elements").element
+            if (mesh.face[shell.source_element[near]] == k).all():
+                rows.append((center, radius, depth))
+                break
+    columns = zip(*rows, strict=True) if rows else (np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+    return Touches(*(np.array(column) for column in columns))
 
 
 @dataclass(frozen=True)

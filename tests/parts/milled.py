@@ -159,13 +159,7 @@ def chamfered_block(rng: Rng) -> Solid:
         return occ.chamfered(solid, occ.edges_at(solid, sides[2]), width)
     radius = 0.25 * sides[:2].min()
     solid = occ.cut(solid, occ.cylinder(radius, 3 * sides[2], (*sides[:2] / 2, -sides[2])))
-    around = occ.edges_where(
-        solid,
-        lambda p: bool(
-            np.abs(np.linalg.norm(p[:, :2] - sides[:2] / 2, axis=1) - radius).max() < 1e-3
-            and np.abs(p[:, 2] - sides[2]).max() < 1e-3
-        ),
-    )
+    around = occ.edges_about_axis(solid, radius, sides[2], sides[:2] / 2)
     return occ.chamfered(solid, around, 0.3 * radius)
 
 

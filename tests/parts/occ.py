@@ -6,29 +6,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from OCP import BRepBuilderAPI, BRepPrimAPI
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve
 from OCP.BRepAlgoAPI import BRepAlgoAPI_Common, BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse
-from OCP.BRepBuilderAPI import (
-    BRepBuilderAPI_MakeEdge,
-    BRepBuilderAPI_MakeFace,
-    BRepBuilderAPI_MakePolygon,
-    BRepBuilderAPI_MakeWire,
-    BRepBuilderAPI_Transform,
-)
 from OCP.BRepCheck import BRepCheck_Analyzer
 from OCP.BRepFilletAPI import BRepFilletAPI_MakeChamfer, BRepFilletAPI_MakeFillet
 from OCP.BRepGProp import BRepGProp
 from OCP.BRepOffsetAPI import BRepOffsetAPI_MakePipe, BRepOffsetAPI_ThruSections
-from OCP.BRepPrimAPI import (
-    BRepPrimAPI_MakeBox,
-    BRepPrimAPI_MakeCone,
-    BRepPrimAPI_MakeCylinder,
-    BRepPrimAPI_MakePrism,
-    BRepPrimAPI_MakeRevol,
-    BRepPrimAPI_MakeSphere,
-    BRepPrimAPI_MakeTorus,
-)
 from OCP.collections import Array1_gp_Pnt
 from OCP.GeomAPI import GeomAPI_PointsToBSpline
 from OCP.gp import gp_Ax1, gp_Ax2, gp_Circ, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
@@ -89,69 +74,60 @@ def checked(solid: Solid) -> Solid:
 
 
 def box(low: ArrayLike, high: ArrayLike) -> Solid:
-    return BRepPrimAPI_MakeBox(_point(low), _point(high)).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeBox(_point(low), _point(high)).Shape()
 
 
 def cylinder(radius: float, length: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
-    return BRepPrimAPI_MakeCylinder(_frame(at, axis), radius, length).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeCylinder(_frame(at, axis), radius, length).Shape()
 
 
 def cone(low, high, length, at=ORIGIN, axis=UP):
     """Radius `low` at the place `at`, `high` at the other end."""
-    return BRepPrimAPI_MakeCone(_frame(at, axis), low, high, length).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeCone(_frame(at, axis), low, high, length).Shape()
 
 
 def ball(radius: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
-    return BRepPrimAPI_MakeSphere(_frame(at, axis), radius).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeSphere(_frame(at, axis), radius).Shape()
 
 
 def torus(ring: float, tube: float, at: ArrayLike = ORIGIN, axis: ArrayLike = UP) -> Solid:
-    return BRepPrimAPI_MakeTorus(_frame(at, axis), ring, tube).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeTorus(_frame(at, axis), ring, tube).Shape()
 
 
 def extruded(outline: ArrayLike, height: float) -> Solid:
     """The polygon `outline` (k, 2) from z = 0 to `height`."""
     points = np.asarray(outline, float)
     face = _face(_polygon(np.c_[points, np.zeros(len(points))]))
-    return BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, height)).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, height)).Shape()
 
 
 def turned(profile: ArrayLike, angle: float = 2 * np.pi) -> Solid:
     """The polygon `profile` (k, 2) of radii and heights about z."""
     points = np.asarray(profile, float)
     face = _face(_polygon(np.c_[points[:, 0], np.zeros(len(points)), points[:, 1]]))
-    return BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(*UP)), angle).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(*UP)), angle).Shape()
 
 
 def turned_spline(profile: ArrayLike) -> Solid:
     """A spline near the points (k, 2) of radii and heights, closed by two lids, about z."""
-    points = np.asarray(profile, float)
-    curve = _spline(np.c_[points[:, 0], np.zeros(len(points)), points[:, 1]])
-    ends = [gp_Pnt(r, 0.0, z) for r, z in (points[-1], (0.0, points[-1, 1]), (0.0, points[0, 1]))]
-    wire = BRepBuilderAPI_MakeWire(curve)
-    for one, other in zip(ends, [*ends[1:], gp_Pnt(points[0, 0], 0.0, points[0, 1])], strict=True):
-        wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
-    return BRepPrimAPI_MakeRevol(_face(wire.Wire()), gp_Ax1(gp_Pnt(), gp_Dir(*UP))).Shape()
+    points = np.insert(np.asarray(profile, float), 1, 0.0, axis=1)
+    face = _below(points, points[-1] * UP, points[0] * UP)
+    return BRepPrimAPI.BRepPrimAPI_MakeRevol(face, gp_Ax1(gp_Pnt(), gp_Dir(*UP))).Shape()
 
 
 def extruded_spline(points: ArrayLike, height: float, depth: float) -> Solid:
     """Below a spline near points (k, 2) that rise along x: `depth` below zero, `height` along z."""
-    outline = np.asarray(points, float)
-    first, last = outline[0], outline[-1]
-    ends = [gp_Pnt(x, y, 0.0) for x, y in (last, (last[0], -depth), (first[0], -depth), first)]
-    wire = BRepBuilderAPI_MakeWire(_spline(np.c_[outline, np.zeros(len(outline))]))
-    for one, other in pairwise(ends):
-        wire.Add(BRepBuilderAPI_MakeEdge(one, other).Edge())
-    return BRepPrimAPI_MakePrism(_face(wire.Wire()), gp_Vec(0.0, 0.0, height)).Shape()
+    outline = np.insert(np.asarray(points, float), 2, 0.0, axis=1)
+    face = _below(outline, *([x, -depth, 0.0] for x in outline[[-1, 0], 0].tolist()))
+    return BRepPrimAPI.BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, height)).Shape()
 
 
 def piped(path: ArrayLike, radius: float) -> Solid:
     """A circle along a spline near points (k, 3)."""
     points = np.asarray(path, float)
     frame = gp_Ax2(_point(points[0]), gp_Dir(*(points[1] - points[0]).tolist()))
-    circle = BRepBuilderAPI_MakeEdge(gp_Circ(frame, radius)).Edge()
-    spine = BRepBuilderAPI_MakeWire(_spline(points)).Wire()
-    return BRepOffsetAPI_MakePipe(spine, _face(BRepBuilderAPI_MakeWire(circle).Wire())).Shape()
+    circle = BRepBuilderAPI.BRepBuilderAPI_MakeEdge(gp_Circ(frame, radius)).Edge()
+    return BRepOffsetAPI_MakePipe(_wire(_spline(points)), _face(_wire(circle))).Shape()
 
 
 def lofted(sections: Iterable[ArrayLike], ruled: bool) -> Solid:
@@ -178,13 +154,13 @@ def common(first: Solid, *others: Solid) -> Solid:
 
 def torus_part(ring: float, tube: float, angle: float) -> Solid:
     """The part of a torus about z from the x axis to `angle`."""
-    return BRepPrimAPI_MakeTorus(_frame(ORIGIN, UP), ring, tube, angle).Shape()
+    return BRepPrimAPI.BRepPrimAPI_MakeTorus(_frame(ORIGIN, UP), ring, tube, angle).Shape()
 
 
 def moved(solid: Solid, by: ArrayLike) -> Solid:
     move = gp_Trsf()
     move.SetTranslation(gp_Vec(*np.asarray(by, float).tolist()))
-    return BRepBuilderAPI_Transform(solid, move, True).Shape()
+    return BRepBuilderAPI.BRepBuilderAPI_Transform(solid, move, True).Shape()
 
 
 def points_of(edge: Edge) -> np.ndarray:
@@ -221,15 +197,14 @@ def upright_edges(solid: Solid) -> list[Edge]:
     )
 
 
-def edges_about_axis(solid: Solid, radius: float, height: float) -> list[Edge]:
-    """Return the edges that lie on a circle about z."""
-    return edges_where(
-        solid,
-        lambda p: bool(
-            np.abs(np.hypot(p[:, 0], p[:, 1]) - radius).max() < 1e-3
-            and np.abs(p[:, 2] - height).max() < 1e-3
-        ),
-    )
+def edges_about_axis(solid, radius, height, middle=(0.0, 0.0)):
+    """Return the edges that lie on a circle about an axis along z."""
+
+    def wanted(p: np.ndarray) -> bool:
+        off = np.linalg.norm(p[:, :2] - middle, axis=1) - radius
+        return bool(max(np.abs(off).max(), np.abs(p[:, 2] - height).max()) < 1e-3)
+
+    return edges_where(solid, wanted)
 
 
 def filleted(solid: Solid, edges: Iterable[Edge], *radii: float) -> Solid:
@@ -263,7 +238,7 @@ def placed(solid: Solid, rng: Rng, reach: float) -> Solid:
     axis = gp_Ax1(gp_Pnt(), gp_Dir(*rng.normal(size=3).tolist()))
     turn.SetRotation(axis, float(rng.uniform(0.0, 2 * np.pi)))
     move.SetTranslation(gp_Vec(*rng.uniform(-reach, reach, 3).tolist()))
-    return BRepBuilderAPI_Transform(solid, move.Multiplied(turn), True).Shape()
+    return BRepBuilderAPI.BRepBuilderAPI_Transform(solid, move.Multiplied(turn), True).Shape()
 
 
 def _combined(kind: Any, first: Solid, others: tuple[Solid, ...]) -> Solid:
@@ -283,7 +258,7 @@ def _frame(at: ArrayLike, axis: ArrayLike) -> gp_Ax2:
 
 
 def _polygon(points: np.ndarray) -> Any:
-    polygon = BRepBuilderAPI_MakePolygon()
+    polygon = BRepBuilderAPI.BRepBuilderAPI_MakePolygon()
     for point in points:
         polygon.Add(_point(point))
     polygon.Close()
@@ -291,11 +266,25 @@ def _polygon(points: np.ndarray) -> Any:
 
 
 def _face(wire: Any) -> Any:
-    return BRepBuilderAPI_MakeFace(wire).Face()
+    return BRepBuilderAPI.BRepBuilderAPI_MakeFace(wire).Face()
+
+
+def _below(points: np.ndarray, *corners: ArrayLike) -> Any:
+    """The face between a spline near points (k, 3) and lines over corners back to its begin."""
+    sides = (map(_point, ends) for ends in pairwise([points[-1], *corners, points[0]]))
+    lines = (BRepBuilderAPI.BRepBuilderAPI_MakeEdge(*ends).Edge() for ends in sides)
+    return _face(_wire(_spline(points), *lines))
+
+
+def _wire(*edges: Edge) -> Any:
+    made = BRepBuilderAPI.BRepBuilderAPI_MakeWire()
+    for edge in edges:
+        made.Add(edge)
+    return made.Wire()
 
 
 def _spline(points: np.ndarray) -> Any:
     row = Array1_gp_Pnt(1, len(points))
     for k, point in enumerate(points, 1):
         row.SetValue(k, _point(point))
-    return BRepBuilderAPI_MakeEdge(GeomAPI_PointsToBSpline(row).Curve()).Edge()
+    return BRepBuilderAPI.BRepBuilderAPI_MakeEdge(GeomAPI_PointsToBSpline(row).Curve()).Edge()

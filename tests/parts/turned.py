@@ -94,17 +94,14 @@ def crossing_cylinders(rng: Rng) -> Solid:
     angle = np.radians(rng.uniform(50.0, 90.0))
     axis = (np.sin(angle), 0.0, np.cos(angle))
     small = radius * rng.uniform(0.4, 0.85)
-    solid = occ.fuse(
-        occ.cylinder(radius, length, (0, 0, -length / 2)),
-        occ.cylinder(small, length, (0, 0, 0), axis),
-    )
-    seam = occ.edges_where(
-        solid,
-        lambda p: bool(
-            np.abs(np.hypot(p[:, 0], p[:, 1]) - radius).max() < 1e-2
-            and np.abs(p[:, 2]).max() < 0.49 * length
-        ),
-    )
+    branch = occ.cylinder(small, length, (0, 0, 0), axis)
+    solid = occ.fuse(occ.cylinder(radius, length, (0, 0, -length / 2)), branch)
+
+    def on_seam(p: np.ndarray) -> bool:
+        off = np.abs(np.hypot(p[:, 0], p[:, 1]) - radius).max()
+        return bool(off < 1e-2 and np.abs(p[:, 2]).max() < 0.49 * length)
+
+    seam = occ.edges_where(solid, on_seam)
     if rng.random() < 0.8:
         solid = occ.filleted(solid, seam, rng.uniform(0.05, 0.4) * small)
     if rng.random() < 0.4:

@@ -32,13 +32,11 @@ def pressed(force=9.81):
 def slide(shell=None, speed=0.2, duration=0.05, friction=None, record_dt=1e-3, law=LAW, **given):
     """Slide a ball of 1 kg over a plate, at rest on it but for its speed along x."""
     scene = sp.Scene(slider())
-    scene.add_contact(
-        sp.Sphere(RADIUS, "ball"), shell or plate(), law=law, friction=friction, name="tip"
-    )
-    q0 = [-0.01, 0.0, RADIUS - pressed()]
-    return sp.Simulation(scene, sp.Adaptive()).run(
-        q0, [speed, 0.0, 0.0], duration, record_dt=record_dt, record=("patch",), **given
-    )
+    pair = sp.Sphere(RADIUS, "ball"), shell or plate()
+    scene.add_contact(*pair, law=law, friction=friction, name="tip")
+    q0, given = [-0.01, 0.0, RADIUS - pressed()], {"record": ("patch",), **given}
+    simulation = sp.Simulation(scene, sp.Adaptive())
+    return simulation.run(q0, [speed, 0.0, 0.0], duration, record_dt=record_dt, **given)
 
 
 def total_force(result):

@@ -1,10 +1,12 @@
 """Patches and taxels of an elastic foundation: by its pressure, not by an ellipse."""
 
+import coal
 import numpy as np
 import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.patches import ShellTaxels, TaxelGrid
+from sphshell_pin.patches.foundation import divide
 from tests.patches.scenes import RADIUS, plate, slider, total_force
 
 KAPPA = 2e9  # modulus over thickness [Pa/m]
@@ -17,12 +19,10 @@ def run(shell=None, duration=0.05, q0=(-0.005, 0.0, RADIUS - DEPTH), method=None
     model = slider(mass=1e4)
     model.gravity.linear[:] = 0.0
     scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(RADIUS, "ball"), shell or plate(), law=LAW, name="tip", method=method
-    )
-    return sp.Simulation(scene, sp.Adaptive()).run(
-        q0, [0.2, 0.0, 0.0], duration, record_dt=1e-3, record=("patch",)
-    )
+    pair = sp.Sphere(RADIUS, "ball"), shell or plate()
+    scene.add_contact(*pair, law=LAW, name="tip", method=method)
+    simulation, rows = sp.Simulation(scene, sp.Adaptive()), {"record_dt": 1e-3}
+    return simulation.run(q0, [0.2, 0.0, 0.0], duration, record=("patch",), **rows)
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +49,10 @@ def test_taxels_add_up(slid):
     elements = ShellTaxels("tip").images(slid)
     np.testing.assert_allclose(elements.forces.sum(axis=1), force, rtol=1e-12)
     # The overlap reaches over 16.3 degrees about the axis, and is the same on all sides.
-    away = np.arccos(-grid.corners()[..., 2])
-    nearest = np.minimum(
-        np.minimum(away[1:, 1:], away[:-1, 1:]), np.minimum(away[1:, :-1], away[:-1, :-1])
-    )
-    assert images.forces[0][nearest > np.arccos(1 - DEPTH / RADIUS)].sum() == 0.0
-    np.testing.assert_allclose(
-        images.forces[0], images.forces[0][::-1, ::-1], atol=0.02 * images.forces[0].max()
-    )
+    away, first = np.arccos(-grid.corners()[..., 2]), images.forces[0]
+    nearest = np.lib.stride_tricks.sliding_window_view(away, (2, 2)).min(axis=(2, 3))
+    assert first[nearest > np.arccos(1 - DEPTH / RADIUS)].sum() == 0.0
+    np.testing.assert_allclose(first, first[::-1, ::-1], atol=0.02 * first.max())
 
 
 def test_at_a_crease_each_wall_takes_its_own():
@@ -66,7 +62,25 @@ def test_at_a_crease_each_wall_takes_its_own():
     result = run(valley, duration=2e-3, q0=q0, method="facets")
     assert (np.bincount(result.contacts.row) == 2).all()
     elements = ShellTaxels("tip").images(result)
-    force = total_force(result)
-    np.testing.assert_allclose(elements.forces.sum(axis=1), force, rtol=1e-12)
+    np.testing.assert_allclose(elements.forces.sum(axis=1), total_force(result), rtol=1e-12)
     left, right = elements.forces[0].reshape(2, 2).sum(axis=0)
     assert left == pytest.approx(right, rel=1e-6)
+
+
+def test_pieces_cover_what_is_near_and_nothing_twice():
+    places = np.array([[0.0, 0.0, 0.0], [0.02, 0.01, 0.0]])
+    samples = divide(plate(0.05, 3), places, 5e-3, 5e-4, curved=False)
+    assert samples.areas.max() <= 25e-8
+    grid = np.round(samples.points / 1e-7).astype(np.int64)
+    assert len(np.unique(grid, axis=0)) == len(grid)
+    near = np.linalg.norm(samples.points - places[0], axis=1) < 5e-3
+    assert samples.areas[near].sum() == pytest.approx(np.pi * 25e-6, rel=0.02)
+
+
+def test_pieces_of_curved_elements_are_on_them():
+    radius = 0.03
+    ball = sp.Shell.from_geometry(coal.Sphere(radius), segments=16)
+    top = np.array([[0.0, 0.0, radius]])
+    curved, flat = (divide(ball, top, 5e-3, 5e-4, curved=one) for one in (True, False))
+    away = [np.abs(np.linalg.norm(one.points, axis=1) - radius).max() for one in (curved, flat)]
+    assert away[0] < 0.1 * away[1]

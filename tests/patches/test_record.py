@@ -5,7 +5,8 @@ import pytest
 
 import sphshell_pin as sp
 from sphshell_pin.dynamics.run.open_run import OpenRun
-from sphshell_pin.errors import InvalidParameter, ResultError
+from sphshell_pin.errors import ResultError
+from tests import meshes
 from tests.oracle.hertz import hertz_contact
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider
 
@@ -23,9 +24,8 @@ def test_a_ball_on_a_plane_has_the_patch_of_hertz():
     # Johnson 4.2: a^2 = R depth, p0 = 3 N / (2 pi a^2).
     a = np.sqrt(RADIUS * log.depth)
     np.testing.assert_allclose(patches["half_axes"], np.stack([a, a], axis=1), rtol=1e-12)
-    np.testing.assert_allclose(
-        patches["peak_pressure"], 1.5 * log.normal_force / (np.pi * a * a), rtol=1e-12
-    )
+    peak = 1.5 * log.normal_force / (np.pi * a * a)
+    np.testing.assert_allclose(patches["peak_pressure"], peak, rtol=1e-12)
     np.testing.assert_allclose(patches["mean_pressure"] * 1.5, patches["peak_pressure"])
     np.testing.assert_allclose(patches["approach"], log.depth)
     assert np.abs((patches["axis_world"] * log.normal_world).sum(axis=1)).max() < 1e-15
@@ -41,20 +41,6 @@ def test_other_numbers_are_the_same_without_patches():
     assert not_asked.patch_rows is None
     with pytest.raises(ResultError, match=r"record=\('patch',\)"):
         not_asked.patches  # noqa: B018
-
-
-def test_files_keep_them_and_are_refused_with_too_few(tmp_path):
-    result = slide()
-    result.save(tmp_path / "run.npz")
-    again = sp.Result.load(tmp_path / "run.npz")
-    assert (again.patches == result.patches).all()
-    assert again.contact_columns()["peak_pressure [Pa]"][7] == result.patches["peak_pressure"][7]
-    with np.load(tmp_path / "run.npz") as file:
-        arrays = dict(file)
-    arrays["patches.approach"] = arrays["patches.approach"][:-1]
-    np.savez(tmp_path / "short.npz", **arrays)
-    with pytest.raises(ResultError, match=r"'patches\.approach' has the shape \(50,\)"):
-        sp.Result.load(tmp_path / "short.npz")
 
 
 def test_open_runs_and_rollouts_record_them():
@@ -73,31 +59,18 @@ def test_a_contact_of_unknown_geometry_has_no_patch():
 
     scene = sp.Scene(slider())
     scene.add_contact_source(find, "ball", "universe", law=LAW, name="own")
-    result = sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(
-        np.zeros(3), None, 1e-3, record=["patch"]
-    )
+    result = sp.Simulation(scene).run(np.zeros(3), None, 1e-3, record=["patch"])
     assert np.isnan(result.patches["half_axes"]).all()
     assert np.isnan(result.patches["peak_pressure"]).all()
-
-
-@pytest.mark.parametrize("record", ["patch", ["pitch"], 3])
-def test_what_cannot_be_recorded_is_refused(record):
-    scene = sp.Scene(slider())
-    with pytest.raises(InvalidParameter, match="record"):
-        sp.Simulation(scene).run(np.zeros(3), record=record)
 
 
 @pytest.mark.parametrize("law", [sp.HertzLaw(1e7, 0.3), LAW], ids=["hertz", "impact"])
 def test_a_ball_on_a_cylinder_has_an_elliptical_patch(law):
     radius = 0.03
-    angle, z = np.meshgrid(np.linspace(-0.9, 0.9, 7), np.linspace(-0.02, 0.02, 5), indexing="ij")
-    across = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1).reshape(-1, 3)
-    corner = (np.arange(6)[:, None] * 5 + np.arange(4)).ravel()
-    shell = sp.Shell(
-        radius * across + np.array([0.0, 0.0, 1.0]) * z.reshape(-1, 1),
-        np.stack([corner, corner + 5, corner + 6, corner + 1], axis=1),
-        normals=across,
-    )
+    flat, elements = meshes.grid_plate(6, 4, quads=True)
+    angle, z = 1.8 * flat[:, 0], 0.04 * flat[:, 1]
+    across = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    shell = sp.Shell(radius * across + np.outer(z, [0, 0, 1]), elements, normals=across)
     away = np.array([np.cos(0.2), np.sin(0.2), 0.0])
     q0 = (radius + RADIUS - 2e-4) * away + np.array([0.0, 0.0, 3e-3])
     result = pressing(shell, law).run(q0, duration=1e-5, record=("patch",))

@@ -7,9 +7,33 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ResultError
 from sphshell_pin.patches import ShellTaxels, TaxelGrid
+from sphshell_pin.patches.placed import load_in_polygons, pressure
+from sphshell_pin.plot.taxels import plot_taxels
+from tests.command import succeed
 from tests.patches.scenes import LAW, RADIUS, plate, pressed, slide, slider, total_force
+from tests.scenario.files import DROP, write
 
 DOWN = (0.0, 0.0, -1.0)
+
+
+def summed(polygon, n=1500):
+    """The load in a convex polygon, by the midpoint rule."""
+    at = (np.arange(n) + 0.5) / n * 2 - 1
+    u = np.stack(np.meshgrid(at, at), axis=-1)
+    inside = np.ones((n, n), dtype=bool)
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        inside &= (b - a)[0] * (u[..., 1] - a[1]) - (b - a)[1] * (u[..., 0] - a[0]) >= 0
+    return (pressure(u) * inside).sum() * (2 / n) ** 2 / (2 * np.pi / 3)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_loads_in_triangles(seed):
+    corners = np.random.default_rng(seed).normal(size=(3, 2))
+    side, other = corners[1] - corners[0], corners[2] - corners[0]
+    if side[0] * other[1] - side[1] * other[0] < 0:
+        corners = corners[::-1]
+    assert load_in_polygons(corners) == pytest.approx(summed(corners), abs=1e-4)
+    assert load_in_polygons(corners[::-1]) == pytest.approx(-load_in_polygons(corners), abs=1e-15)
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +51,10 @@ def slid():
     ],
 )
 def test_forces_add_up(slid, grid):
-    images = grid.images(slid)
+    images, force = grid.images(slid), total_force(slid)
     assert images.forces.shape == (51, *grid.shape)
-    force = total_force(slid)
-    np.testing.assert_allclose(
-        images.forces.sum(axis=(1, 2)) + images.outside, force, rtol=1e-12, atol=0
-    )
+    found = images.forces.sum(axis=(1, 2)) + images.outside
+    np.testing.assert_allclose(found, force, rtol=1e-12, atol=0)
     # All of the patch is on these grids: the integrals themselves must add up.
     assert np.abs(images.outside).max() < 1e-12 * force.max()
     assert images.forces.min() > -1e-12 * force.max()
@@ -80,9 +102,8 @@ def test_both_of_two_spheres_feel_it():
     model.addFrame(pin.Frame("ground", 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
     scene = sp.Scene(model)
     scene.add_contact(sp.Sphere(RADIUS, "ball"), sp.Sphere(0.02, "ground"), law=LAW, name="tip")
-    scene.add_contact(
-        sp.Sphere(0.02, "ground"), plate(height=lambda x, y: -0.03), law=LAW, name="below"
-    )
+    low = plate(height=lambda x, y: -0.03)
+    scene.add_contact(sp.Sphere(0.02, "ground"), low, law=LAW, name="below")
     q0 = [0.0, 0.0, 0.03 - pressed()]
     result = sp.Simulation(scene).run(q0, duration=1e-4, record=("patch",))
     own = np.asarray(result.contacts.pair) == 0
@@ -122,3 +143,36 @@ def test_mistakes(slid):
         TaxelGrid("finger", (4, 4)).images(slid)
     with pytest.raises(ResultError, match="no CAD faces"):
         ShellTaxels("tip", "faces").images(slid)
+
+
+def test_images_of_taxels_have_latitude_upwards(slid):
+    grid = TaxelGrid("tip", (4, 6), axis=DOWN, up=(0, 1, 0), extent=(0.4, 0.6))
+    figure = plot_taxels(grid.images(slid), [0, 10])
+    shown = figure.axes[0].images[0]
+    assert shown.origin == "lower"
+    assert shown.get_array().shape == (4, 6)
+    with pytest.raises(InvalidParameter, match="TaxelGrid"):
+        plot_taxels(ShellTaxels("tip").images(slid), [0])
+
+
+def test_a_scenario_writes_patches_and_taxels(tmp_path):
+    text = DROP.replace(
+        "[run]", 'friction = { type = "coulomb", mu_static = 0.3 }\n[run]\nrecord = ["patch"]'
+    ).replace("[robot]", "[robot]\nspeed = { root_joint = [0.2, 0, 0, 0, 0, 0] }")
+    out = tmp_path / "out"
+    succeed("run", write(tmp_path, text), "--out", out)
+    result = sp.Result.load(out / "run.npz")
+    assert len(result.patches) == len(result.contacts) > 0
+    assert "pressure of patches" in (out / "recording.html").read_text(encoding="utf-8")
+    # A loaded result finds the scene of its scenario.
+    images = sp.TaxelGrid("ball-plate", (4, 6), axis=DOWN).images(result)
+    assert images.forces.shape == (len(result.t), 4, 6)
+    felt = images.forces.sum(axis=(1, 2)) + images.outside
+    np.testing.assert_allclose(felt, total_force(result), rtol=1e-12, atol=1e-300)
+
+
+def test_a_run_without_patches_has_no_taxels(tmp_path):
+    out = tmp_path / "out"
+    succeed("run", write(tmp_path), "--out", out, "--no-recording")
+    with pytest.raises(ResultError, match="has no patches"):
+        sp.TaxelGrid("ball-plate", (4, 6)).images(sp.Result.load(out / "run.npz"))

@@ -80,9 +80,8 @@ def head_on(first, second, law, friction=None, *, rows=0):
 
 def _free(balls: list[Ball]) -> pin.Model:
     inertias = [pin.Inertia.FromSphere(ball.mass, ball.radius) for ball in balls]
-    return model_of(
-        *((f"ball{k}", pin.JointModelFreeFlyer(), one) for k, one in enumerate(inertias))
-    )
+    free = pin.JointModelFreeFlyer()
+    return model_of(*((f"ball{k}", free, one) for k, one in enumerate(inertias)))
 
 
 def _run(scene, balls, centers, plain, mass, speed, rows):

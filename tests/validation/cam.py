@@ -38,9 +38,8 @@ def turn_cam() -> tuple[Array, dict[str, Array]]:
     depth = law.depth_at(MASS * (GRAVITY + ECCENTRICITY * SPEED**2))
     q0 = np.array([1.0, 0.0, RADIUS - ECCENTRICITY - depth])
     duration = 2 * math.pi / SPEED
-    result = sp.Simulation(scene, sp.Adaptive(1e-10)).run(
-        q0, [SPEED, 0.0], duration, record_dt=duration / 720
-    )
+    simulation = sp.Simulation(scene, sp.Adaptive(1e-10))
+    result = simulation.run(q0, [SPEED, 0.0], duration, record_dt=duration / 720)
     return SPEED * result.t, {
         "acceleration": result.contacts.normal_force / MASS - GRAVITY,
         "velocity": result.v[:, 1],

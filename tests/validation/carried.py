@@ -60,9 +60,8 @@ def push_box(angle: float, duration: float) -> tuple[Array, Array, Array]:
     along = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle)), 0.0])
     push = np.zeros(model.nv)
     push[:3] = FORCE * along
-    result = sp.Simulation(scene, sp.RungeKutta4(2e-4)).run(
-        q0, None, duration, lambda t, q, v, contacts: push, record_dt=0.01
-    )
+    simulation, control = sp.Simulation(scene, sp.RungeKutta4(2e-4)), lambda *_: push
+    result = simulation.run(q0, None, duration, control, record_dt=0.01)
     turns, moves = (result.q[:, 3:7], result.q[:, 10:14]), (result.v[:, :3], result.v[:, 6:9])
     both = np.stack([turned(*one) for one in zip(turns, moves, strict=True)], axis=1)
     return result.t, both @ along, np.linalg.norm(np.cross(both, along), axis=2)
@@ -82,10 +81,8 @@ def carried_balls() -> Outcome:
     runs = {angle: push_box(angle, duration) for angle, duration in DURATIONS.items()}
     slopes = np.array([accelerations(t, speeds) for t, speeds, _ in runs.values()])
     box, ball = np.abs(slopes / EXACT - 1).max(axis=0)
-    errors = [
-        float(np.sum((speeds - np.outer(t, EXACT)) ** 2 + across**2, axis=1).mean())
-        for t, speeds, across in (runs[90.0], runs[60.0])
-    ]
+    off = [(speeds - np.outer(t, EXACT), across) for t, speeds, across in (runs[90.0], runs[60.0])]
+    errors = [float(np.sum(one**2 + across**2, axis=1).mean()) for one, across in off]
     aside = max(float((across[-1] / speeds[-1]).max()) for _, speeds, across in runs.values())
     theirs = {name: data[name] for name in ("along y", "diagonal")}
     what = "four directions, acceleration relative to"

@@ -26,19 +26,8 @@ from tests.register import Register
 from tests.validation.pictures import Panel, Series
 
 MODULES = (
-    "kharaz",
-    "chung_ooi",
-    "pressed",
-    "ellipses",
-    "finger_pad",
-    "cam",
-    "rolling",
-    "restitution",
-    "leaving",
-    "carried",
-    "tippe_top",
-    "rattleback",
-    "tosses",
+    *("kharaz", "chung_ooi", "pressed", "ellipses", "finger_pad", "cam", "rolling"),
+    *("restitution", "leaving", "carried", "tippe_top", "rattleback", "tosses"),
 )
 """In the order of the page."""
 Sense = Literal["<=", ">="]
@@ -124,10 +113,8 @@ def within(
     aim: float, *errors: tuple[str, float], unit: str = "", why: str = "", sense: Sense = "<="
 ) -> list[Figure]:
     """Return figures of errors (what, error), of which only the size counts."""
-    return [
-        Figure("", what, abs(float(error)), unit, aim=aim, sense=sense, why=why)
-        for what, error in errors
-    ]
+    more = {"aim": aim, "sense": sense, "why": why}
+    return [Figure("", what, abs(float(error)), unit, **more) for what, error in errors]
 
 
 # What a case states of itself is in cases.toml.

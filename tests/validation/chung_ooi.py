@@ -67,10 +67,8 @@ def restitution() -> Outcome:
     """Run test 3."""
     findings: list[Figure] = []
     ours, stated = [], (0.2, 0.4, 0.6, 0.8, 1.0)
-    for name, young, poisson, density in (
-        ("aluminum oxide", 3.8e11, 0.23, 4000.0),
-        ("cast iron", 1e11, 0.25, 7000.0),
-    ):
+    materials = ("aluminum oxide", 3.8e11, 0.23, 4000.0), ("cast iron", 1e11, 0.25, 7000.0)
+    for name, young, poisson, density in materials:
         laws = [sp.HertzLaw(young, poisson, RIGID, poisson, one, 3.9) for one in stated]
         ball = Ball(2.5e-3, density, (0, 0, -3.9))
         back = [float(on_plane(ball, law).velocities[0, 2]) / 3.9 for law in laws]
@@ -160,10 +158,8 @@ def _spinning(key: str, spheres: dict[str, Setting]) -> Outcome:
             findings += within(bound, (f"{title}, sliding", rms(errors[slide])))
             stick = f"{title}, sticking", rms(errors[~slide])
             findings += within(bound, stick, why=WHY["damped"])
-        ours = [
-            (f"ours, {name}", drawn, after_spinning(one, drawn, quantity))
-            for name, one in spheres.items()
-        ]
+        seen = {name: after_spinning(one, drawn, quantity) for name, one in spheres.items()}
+        ours = [(f"ours, {name}", drawn, one) for name, one in seen.items()]
         panels.append(Panel(*axes, marks, ours))
     return Outcome(findings, panels)
 
@@ -185,9 +181,8 @@ def opposite() -> Outcome:
         two = replace(one, young_2=one.young, radius_2=one.radius)
         seen = []
         for spin in before:
-            balls = [
-                Ball(0.1, two.density, (0, 0, s * -0.2), (0, s * spin, 0)) for s in (1.0, -1.0)
-            ]
+            moves = [((0, 0, -0.2 * s), (0, s * spin, 0)) for s in (1.0, -1.0)]
+            balls = [Ball(0.1, two.density, *one) for one in moves]
             seen.append(head_on(*balls, *two.laws(0.4)))
         spins = np.array([one.spins[0, 1] for one in seen])
         slip = np.abs([one.velocities[0, 0] for one in seen] - data["tangential"]).max()

@@ -4,14 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.base.arrays import Array
 from sphshell_pin.contact.normal_law import NormalLaw
 from sphshell_pin.study.report.contents import Table, columns
-from sphshell_pin.study.report.models import model_of
-from tests import meshes
+from tests import meshes, models
 from tests.validation.balls import plane
 from tests.validation.cases import Data, Outcome, case, read, within
 from tests.validation.pictures import Panel
@@ -35,11 +33,8 @@ class Touch:
 
 def press(radius: float, shell: sp.Shell, law: NormalLaw, approach: float) -> Touch:
     """Return the contact of a ball of `radius` [m] over the shell, whose top is at the origin."""
-    ball = ("ball", pin.JointModelPZ(), pin.Inertia.FromSphere(1e3, radius))
-    scene = sp.Scene(model_of(ball))
-    scene.add_contact(sp.Sphere(radius, "ball"), shell, law=law)
-    start = np.array([radius - approach])
-    result = sp.Simulation(scene).run(start, None, 1e-12, record=("patch",))
+    scene = models.on_shell(models.slider(0.0, 1e3), shell, law, radius=radius)
+    result = sp.Simulation(scene).run([radius - approach], None, 1e-12, record=("patch",))
     (a, b), patch = result.patches["half_axes"][0], result.patches[0]
     force = float(result.contacts.normal_force[0])
     return Touch(force, float(a), float(b), float(patch["approach"]), float(patch["peak_pressure"]))
@@ -109,10 +104,8 @@ def elliptical_contacts() -> Outcome:
         return float(np.nanmax([errors[n][q] for n in names for q in quantities]))
 
     contact = [name for name in errors if name != "bearing"]
-    axes, numerical = (
-        worst(contact, ("a", "b")),
-        "largest error relative to CONTACT's numerical one",
-    )
+    axes = worst(contact, ("a", "b"))
+    numerical = "largest error relative to CONTACT's numerical one"
     bearing = "bearing 6206, half axes and pressure relative to those of approximate formulas"
     findings = [
         *within(5e-4, ("half axes, largest error relative to CONTACT's", axes)),

@@ -23,14 +23,9 @@ def finger_pad() -> Outcome:
     """Compare how displacement grows with force, and the largest pressure with the mean one."""
     published = read("finger_pad").published
     plate, approaches = plane(1.0), RADIUS * np.geomspace(1e-3, 5e-2, 9)
-    laws = {
-        "FoundationLaw": sp.FoundationLaw(MODULUS, THICKNESS),
-        "HertzLaw": sp.HertzLaw(MODULUS, POISSON),
-    }
-    touches = {
-        name: [press(RADIUS, plate, law, approach) for approach in approaches]
-        for name, law in laws.items()
-    }
+    laws = sp.FoundationLaw(MODULUS, THICKNESS), sp.HertzLaw(MODULUS, POISSON)
+    pressed = ([press(RADIUS, plate, law, approach) for approach in approaches] for law in laws)
+    touches = dict(zip(("FoundationLaw", "HertzLaw"), pressed, strict=True))
     findings, measured = [], published["displacement_exponent"]
     for name, found in touches.items():
         last = found[-1]

@@ -83,9 +83,8 @@ def measured() -> Outcome:
 
 def _own_error(data: Data) -> float:
     """Return by how much measured spins contradict measured velocities, over the largest."""
-    velocity, spin = (
-        data.where("quantity", one).where("reading", "kratos") for one in ("restitution", "spin")
-    )
+    mine = data.where("reading", "kratos")
+    velocity, spin = (mine.where("quantity", one) for one in ("restitution", "spin"))
     ratio = np.interp(spin["angle"], velocity["angle"], velocity["value"])
     along = SPEED * np.sin(np.radians(spin["angle"]))
     error = rms(2.5 * (1 - ratio) * along / GLASS.radius - spin["value"])
@@ -113,10 +112,8 @@ def rigid() -> Outcome:
                 far = angle > 9
                 findings += figures(bound, quantity, ours[far], value[far], of=f", {name}{steep}")
         panels.append(panel(quantity, marks, lines, OXIDE))
-    slow, less, whole = (
-        thrown(OXIDE, share * SPEED, [5.0, 15.0, 25.0, 35.0, 60.0])["restitution"]
-        for share in (0.01, 0.1, 1.0)
-    )
+    angles, speeds = [5.0, 15.0, 25.0, 35.0, 60.0], SPEED * np.array([0.01, 0.1, 1.0])
+    slow, less, whole = (thrown(OXIDE, speed, angles)["restitution"] for speed in speeds)
     what = "largest change of v'/v from 0.039 to 0.39 m/s", "the same from 0.039 to 3.9 m/s"
     findings += within(1e-3, (what[0], np.abs(less - slow).max()))
     findings += within(1e-3, (what[1], np.abs(whole - slow).max()), why=WHY["depth"])

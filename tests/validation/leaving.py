@@ -60,9 +60,8 @@ def roll_off(mu: float) -> float:
     above = reach * np.array([math.sin(START), 0.0, math.cos(START)])
     q0, v0 = state(above, np.zeros(3), np.zeros(3))
     pace = math.sqrt(GRAVITY / reach / 1.4)
-    result = sp.Simulation(scene, sp.Adaptive(1e-9)).run(
-        q0, v0, math.log(4 / START) / pace, record_dt=1e-4
-    )
+    duration = math.log(4 / START) / pace
+    result = sp.Simulation(scene, sp.Adaptive(1e-9)).run(q0, v0, duration, record_dt=1e-4)
     left = next(event.t for event in result.events if event.kind == "lift_off")
     angle = np.arctan2(result.q[:, 0], result.q[:, 2])
     return float(np.interp(left, result.t, angle))

@@ -2,26 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from sphshell_pin.plot.figure import new_figure, png
 
-INK, FAINT, RULE = "#1c2024", "#656d77", "#e2e3df"
+INK = "#1c2024"
 COLORS, MARKS = ("#2160b8", "#c26a00", "#14804a", "#7340b0", "#b8262f"), ("o", "s", "^", "D", "v")
-STYLE: dict[str, object] = {
-    "font.size": 9.0,
-    "axes.edgecolor": FAINT,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": RULE,
-    "xtick.labelsize": 8.0,
-    "ytick.labelsize": 8.0,
-    "lines.linewidth": 1.6,
-}
+STYLE = Path(__file__).with_name("pictures.mplstyle")
 Series = tuple[str, ArrayLike, ArrayLike]
 """A name, x (n,) and y (n,)."""
 
@@ -51,7 +41,7 @@ def draw(panels: Sequence[Panel]) -> bytes:
 
     dashed = {"color": INK, "linewidth": 1.0, "linestyle": (0, (4, 3))}
     marked = {"color": INK, "linestyle": "", "markerfacecolor": "none", "markersize": 4.5}
-    with rc_context(STYLE):  # type: ignore[arg-type]
+    with rc_context(fname=STYLE):
         axes = figure.subplots(tall, wide, squeeze=False).flat
         for axis, panel in zip(axes, panels, strict=True):
             for k, (label, x, y) in enumerate(panel.ours):

@@ -17,9 +17,8 @@ def two_balls() -> Outcome:
     data = read("ssnv104")
     upper = ("upper", pin.JointModelPZ(), pin.Inertia.FromSphere(1.0, RADIUS))
     scene = sp.Scene(model_of(upper, gravity=9.81))
-    scene.add_contact(
-        sp.Sphere(RADIUS, "upper"), sp.Sphere(RADIUS, "universe"), law=sp.HertzLaw(YOUNG, POISSON)
-    )
+    balls = sp.Sphere(RADIUS, "upper"), sp.Sphere(RADIUS, "universe")
+    scene.add_contact(*balls, law=sp.HertzLaw(YOUNG, POISSON))
 
     def pressed(approach: float) -> tuple[float, float]:
         """Return peak pressure [Pa] and radius [m] of the contact, as a run records them."""
@@ -30,11 +29,8 @@ def two_balls() -> Outcome:
 
     there = [float(data[name][0]) for name in ("pressure", "radius")]
     apart = np.array(pressed(4e-3)) / there - 1
-    findings = within(
-        1e-4,
-        ("peak pressure, relative", apart[0]),
-        ("radius of the contact, relative", apart[1]),
-    )
+    names = "peak pressure, relative", "radius of the contact, relative"
+    findings = within(1e-4, *zip(names, apart, strict=True))
     approaches = np.linspace(1e-5, 5e-3, 60)
     ours = np.array([pressed(one) for one in approaches]).T
     panels = [

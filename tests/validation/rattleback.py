@@ -65,11 +65,8 @@ def ellipsoid(cells: int, axes: Array) -> tuple[Array, Array, Array]:
     angle = np.tan(np.linspace(-math.pi / 4, math.pi / 4, cells + 1))
     u, v = np.meshgrid(angle, angle, indexing="ij")
     quads = meshes.grid_plate(cells, cells, quads=True)[1]
-    points = [
-        np.roll(np.dstack([sign * np.ones_like(u), sign * u, v]), k, axis=2)
-        for k in range(3)
-        for sign in (1.0, -1.0)
-    ]
+    sides = [np.dstack([sign * np.ones_like(u), sign * u, v]) for sign in (1.0, -1.0)]
+    points = [np.roll(side, k, axis=2) for k in range(3) for side in sides]
     every = np.concatenate(points).reshape(-1, 3)
     every /= np.linalg.norm(every, axis=1)[:, None]
     normals = every / axes
@@ -90,9 +87,8 @@ def spin_on_plane(spin: float, duration: float) -> tuple[Array, Array, float]:
         friction=sp.BristleFriction(5.0, 5.0, STIFF, DAMPING),
     )
     reach = float(np.linalg.norm(AXES * START[2]))
-    q0 = np.concatenate(
-        ([0.0, 0.0, reach - MASS * GRAVITY / STIFF], pin.Quaternion(START).coeffs())
-    )
+    height = reach - MASS * GRAVITY / STIFF
+    q0 = np.concatenate(([0.0, 0.0, height], pin.Quaternion(START).coeffs()))
     w = np.array([0.0, 0.0, spin])
     v0 = np.concatenate((np.cross(w, AXES**2 * START[2] / reach), w))
     result = sp.Simulation(scene, sp.RungeKutta4(STEP)).run(q0, v0, duration, record_dt=0.001)

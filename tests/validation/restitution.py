@@ -9,11 +9,10 @@ it depends on c = b v alone.
 import math
 
 import numpy as np
-import pinocchio as pin
 
 import sphshell_pin as sp
 from sphshell_pin.contact.normal_law import bisect
-from sphshell_pin.study.report.models import model_of
+from tests import models
 from tests.validation.balls import plane
 from tests.validation.cases import Outcome, case, read, within
 from tests.validation.pictures import Panel
@@ -39,14 +38,11 @@ def hunt_crossley_restitution(speed: float, dissipation: float) -> float:
 
 def bounce(mass: float, law: sp.HuntCrossleyLaw, speed: float) -> float:
     """Return the measured restitution of a sphere that meets a plane at `speed` [m/s]."""
-    sphere = ("ball", pin.JointModelPZ(), pin.Inertia.FromSphere(mass, RADIUS))
-    scene = sp.Scene(model_of(sphere))
-    scene.add_contact(sp.Sphere(RADIUS, "ball"), plane(1.0), law=law)
+    scene = models.on_shell(models.slider(0.0, mass), plane(1.0), law, radius=RADIUS)
     undamped = sp.ImpactLaw(law.stiffness, law.exponent)
     touching = undamped.contact_time(undamped.depth_of(0.5 * mass * speed**2), speed)
-    result = sp.Simulation(scene, sp.Adaptive(1e-10)).run(
-        [RADIUS + GAP], [-speed], GAP / speed + 4 * touching
-    )
+    simulation, duration = sp.Simulation(scene, sp.Adaptive(1e-10)), GAP / speed + 4 * touching
+    result = simulation.run([RADIUS + GAP], [-speed], duration)
     assert [event.kind for event in result.events] == ["touch", "lift_off"]
     return float(result.v[-1, 0]) / speed
 

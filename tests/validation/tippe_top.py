@@ -40,9 +40,8 @@ def spin_top(friction: Friction) -> tuple[Array, Array, Array, float]:
     scene.add_contact(sphere, plane(5.0), law=law, friction=friction)
     height = RADIUS - MASS * GRAVITY / STIFF - OFF * math.cos(TILT)
     q0 = [0.0, 0.0, height, math.sin(TILT / 2), 0.0, 0.0, math.cos(TILT / 2)]
-    result = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-        q0, [0.0, 0.0, 0.0, 0.0, 0.0, SPIN], DURATION, record_dt=0.005
-    )
+    v0, simulation = [0.0, 0.0, 0.0, 0.0, 0.0, SPIN], sp.Simulation(scene, sp.Adaptive(1e-8))
+    result = simulation.run(q0, v0, DURATION, record_dt=0.005)
     turns, spins = result.q[:, 3:7], result.v[:, 3:6]
     axis = turned(turns, np.tile(UP, (len(result.t), 1)))
     momentum = turned(turns, spins * [ACROSS, ACROSS, AXIAL])

@@ -14,7 +14,8 @@ from sphshell_pin import Shell
 from sphshell_pin.base.arrays import Array
 from tests.contact.helpers import directions, energy, force_sum
 from tests.contact.smooth.surfaces import jittered_grid
-from tests.contact.smooth.test_real_surfaces import faults, jump
+from tests.contact.smooth.test_real_surfaces import faults
+from tests.contact.walks import jump
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -93,7 +94,6 @@ if __name__ == "__main__":
     rows = table()
     print("\n".join(f"| {' | '.join(row)} |" for row in rows))
     text = "Spheres of radius r. Each row is a test; an open one is expected to fail, and says why."
-    cases = Measured(
-        "Contacts of curved elements", text, table=[("case", "what is right", ""), *rows]
-    )
+    head = "case", "what is right", ""
+    cases = Measured("Contacts of curved elements", text, table=[head, *rows])
     print(write("contact_cases", "python -m tests.contact.smooth.hard_cases", [cases]))

@@ -32,10 +32,8 @@ class Part:
     def errors(self, normals: Array | None = None) -> tuple[float, float]:
         """Largest error of the closest distance on the curved and on the flat elements."""
         shell = Shell(self.vertices, self.elements, normals=normals)
-        curved, flat = (
-            np.abs(np.abs(shell.closest_points(self.places, method=m).distances) - self.distances)
-            for m in ("smooth", "facets")
-        )
+        found = (shell.closest_points(self.places, method=m) for m in ("smooth", "facets"))
+        curved, flat = (np.abs(np.abs(one.distances) - self.distances) for one in found)
         return float(curved.max()), float(flat.max())
 
     def is_worse_than_flat(self, normals: Array | None = None, tolerance: float = 1e-3) -> bool:
@@ -88,9 +86,8 @@ def turned(profile: Array, sides: int, rng: np.random.Generator) -> Part:
 
 def extruded(section: Array, height: float, rows: int, rng: np.random.Generator) -> Part:
     """A strip over the polyline `section` (k, 2), open above and below."""
-    return swept(
-        lambda flat, z: np.c_[flat, z], np.linspace(0, height, rows + 1), section, rng, False
-    )
+    stations = np.linspace(0, height, rows + 1)
+    return swept(lambda flat, z: np.c_[flat, z], stations, section, rng, closed=False)
 
 
 def polyline(lengths: Array, turns: Array, first: float = 0.0) -> Array:
@@ -120,9 +117,8 @@ def random_turned(seed: int) -> Part:
             lengths(rng, count), kinks(rng, count - 1), rng.choice([0, rng.uniform(-0.26, 0.26)])
         )
         profile = np.stack([1 + line[:, 1], line[:, 0]], 1)
-        rising = (
-            np.diff(profile[:, 1]) > 0.5 * np.linalg.norm(np.diff(profile, axis=0), axis=1)
-        ).all()
+        chords = np.diff(profile, axis=0)
+        rising = (chords[:, 1] > 0.5 * np.linalg.norm(chords, axis=1)).all()
         if rising and profile[:, 0].min() > 0.3 and profile[:, 0].max() < 8:
             return turned(profile, int(rng.integers(12, 65)), rng).as_a_file_has_it(seed)
 
@@ -154,9 +150,8 @@ def distance_to_fillet(points: Array, turn: float, wall: float) -> Array:
     walls = np.minimum(distance_to_polyline(points, arc[:2]), distance_to_polyline(points, arc[2:]))
     from_middle = points - [0.0, 1.0]
     angle = np.arctan2(from_middle[:, 0], -from_middle[:, 1])
-    round_ = np.where(
-        (angle > 0) & (angle < turn), np.abs(np.linalg.norm(from_middle, axis=1) - 1), np.inf
-    )
+    off = np.abs(np.linalg.norm(from_middle, axis=1) - 1)
+    round_ = np.where((angle > 0) & (angle < turn), off, np.inf)
     return np.minimum(walls, round_)
 
 

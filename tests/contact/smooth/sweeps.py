@@ -36,9 +36,8 @@ def about(axis, center, angles):
 def sweep(shell, path):
     """Pairs of centres WIDTH apart where the force may jump: wherever the features change, and,
     lest it jump where they do not, in the step of the path over which it changes most."""
-    pairs = [
-        pair for ends in pairwise(path) for pair in borders(partial(query, shell), *ends, WIDTH)
-    ]
+    find = partial(query, shell)
+    pairs = [pair for ends in pairwise(path) for pair in borders(find, *ends, WIDTH)]
 
     def force(center):
         return force_sum(query(shell, center))
@@ -66,9 +65,8 @@ def assert_continuous(shell, paths, depth: float, least: int = 1, limit: float =
     for path in paths:
         pairs = sweep(shell, path)
         seen += len(pairs) - 1
-        for (force, potential), (before, _) in zip(
-            changes(shell, pairs, depth), pairs, strict=True
-        ):
+        found = zip(changes(shell, pairs, depth), pairs, strict=True)
+        for (force, potential), (before, _) in found:
             worst = max(worst, (float(max(force, potential)), before.tolist()), key=lambda w: w[0])
     assert seen >= least
     assert worst[0] <= limit, worst

@@ -10,36 +10,28 @@ from sphshell_pin import Shell
 from sphshell_pin.shell.raw import random_places
 from tests import meshes
 from tests.contact.helpers import directions
-from tests.contact.smooth.parts import (
-    Part,
-    averaged_normals,
-    distance_to_fillet,
-    extruded,
-    fillet,
-    random_extruded,
-    random_turned,
-)
+from tests.contact.smooth import parts
 from tests.contact.smooth.surfaces import SURFACES, mean_edge
 
 COUNT = 50  # of each family
 
 
 @pytest.mark.parametrize("averaged", [False, True])
-@pytest.mark.parametrize("make", [random_turned, random_extruded])
+@pytest.mark.parametrize("make", [parts.random_turned, parts.random_extruded])
 def test_random_parts(make, averaged: bool) -> None:
     """Kinks of 3 to 29 degrees between stretches of 0.2 to 20 radii. A few polygons may turn as
     evenly as a sampled curve does. The normals of a file bear witness no more than the elements."""
-    parts = [make(seed) for seed in range(COUNT)]
-    normals = [averaged_normals(p.vertices, p.elements) if averaged else None for p in parts]
-    worse = [seed for seed in range(COUNT) if parts[seed].is_worse_than_flat(normals[seed])]
+    some = [make(seed) for seed in range(COUNT)]
+    normals = [parts.averaged_normals(p.vertices, p.elements) if averaged else None for p in some]
+    worse = [seed for seed in range(COUNT) if some[seed].is_worse_than_flat(normals[seed])]
     assert len(worse) <= 0.02 * COUNT, worse
 
 
-def fillet_part(chords: int, turn: float, wall: float, rows: int) -> Part:
+def fillet_part(chords: int, turn: float, wall: float, rows: int) -> parts.Part:
     rng = np.random.default_rng(chords)
-    part = extruded(fillet(chords, turn, wall), 3.0, rows, rng)
-    exact = distance_to_fillet(part.places[:, :2], turn, wall)
-    return Part(part.vertices, part.elements, part.places, exact)
+    part = parts.extruded(parts.fillet(chords, turn, wall), 3.0, rows, rng)
+    exact = parts.distance_to_fillet(part.places[:, :2], turn, wall)
+    return parts.Part(part.vertices, part.elements, part.places, exact)
 
 
 @pytest.mark.parametrize("wall", [3.0, 20.0])
@@ -57,8 +49,8 @@ def test_fillets(wall: float, rows: int) -> None:
 @pytest.mark.parametrize("rows", [1, 3])
 def test_chamfers_stay_flat(wall: float, rows: int) -> None:
     for degrees in (10, 30, 50):
-        section = fillet(1, np.radians(degrees), wall)
-        part = extruded(section, 3.0, rows, np.random.default_rng(degrees))
+        section = parts.fillet(1, np.radians(degrees), wall)
+        part = parts.extruded(section, 3.0, rows, np.random.default_rng(degrees))
         assert part.errors()[0] <= 1e-12
 
 
@@ -79,14 +71,13 @@ def test_smooth_shaded_solids(name: str, points) -> None:
     """Normals that were averaged over the edges are set aside, and the report counts them."""
     hull = trimesh.convex.convex_hull(points)
     vertices, elements = np.array(hull.vertices), np.array(hull.faces)
-    shell = Shell(vertices, elements, normals=averaged_normals(vertices, elements))
+    shell = Shell(vertices, elements, normals=parts.averaged_normals(vertices, elements))
     size = np.linalg.norm(np.ptp(vertices, axis=0))
     rng = np.random.default_rng(0)
     low, high = vertices.min(axis=0) - 0.3 * size, vertices.max(axis=0) + 0.3 * size
     places = rng.uniform(low, high, (1000, 3))
-    curved, flat = (
-        np.abs(shell.closest_points(places, method=m).distances) for m in ("smooth", "facets")
-    )
+    found = (shell.closest_points(places, method=m) for m in ("smooth", "facets"))
+    curved, flat = (np.abs(one.distances) for one in found)
     assert np.abs(curved - flat).max() <= 1e-3 * size
     assert shell.core_for("smooth").normals_set_aside.any()
 
@@ -99,10 +90,8 @@ def test_propeller(radii: tuple[float, float]) -> None:
     rng, count = np.random.default_rng(0), 2000
     which, on_flat = random_places(shell.vertices[shell.triangles], count, rng)
     radius = np.exp(rng.uniform(*np.log(radii), count))
-    outside = ((1 - rng.uniform(0.05, 0.2, count)) * radius)[:, None] * shell.triangle_normals[
-        which
-    ]
-    depth, _ = shell.contacts_batch(on_flat + outside, radius)
+    away = (1 - rng.uniform(0.05, 0.2, count)) * radius
+    depth, _ = shell.contacts_batch(on_flat + away[:, None] * shell.triangle_normals[which], radius)
     assert (depth > 0).all()
 
 
@@ -129,3 +118,12 @@ def test_noise_above_the_curvature_stays_flat() -> None:
         curved.append(np.mean(core.bending == 0))
     assert curved[0] >= 0.99
     assert curved[1] <= 0.1
+
+
+@pytest.mark.parametrize("columns", [16, 40])
+def test_normals_estimated_on_spheres_are_exact(columns: int) -> None:
+    """From elements of longitude and latitude alone, however narrow near the poles."""
+    polar = np.linspace(0.05, np.pi - 0.05, columns)
+    vertices, elements = meshes.revolved(np.stack([np.sin(polar), -np.cos(polar)], 1), columns)
+    found = Shell(vertices, elements).core_for("smooth").corner_normals
+    assert np.abs(found - vertices[elements]).max() <= 1e-9

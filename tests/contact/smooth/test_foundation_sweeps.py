@@ -6,20 +6,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from sphshell_pin import Shell, _core
+from sphshell_pin import Shell
 from tests.contact.smooth.surfaces import shell_of
 from tests.contact.smooth.sweeps import LIMIT, UP, WIDTH, segment
 from tests.contact.smooth.test_sweeps_edges import EDGED, along_edges, edged, over_vertex, star
-from tests.contact.smooth.test_sweeps_folds import KINDS, fold, fold_paths
-from tests.contact.smooth.test_sweeps_smooth import SMOOTH, rolled
+from tests.contact.smooth.test_sweeps_folds import KINDS, SMOOTH, fold, fold_paths, rolled
+from tests.contact.test_foundation import total
 from tests.contact.walks import steepest
 
 DEPTHS = (0.04, 0.004)
 
 
 def force(shell, center):
-    found = _core.Foundation().find(shell.core_for("smooth"), center, 1.0, 2)
-    return found[0][4].sum(axis=0)
+    return total(shell, center)[0]
 
 
 def assert_no_jump(shell, paths, depth: float) -> None:
@@ -65,12 +64,10 @@ def test_vertices(kind: str, slope: float) -> None:
 def test_edge_on_a_sheet_gives_way() -> None:
     """The one place where the force jumps: through the plane of an open sheet, outside its border.
     The potential does not."""
-    shell, core = edged("sheet"), edged("sheet").core_for("smooth")
-    place = np.array([2.9, 0.1, 0.0])
+    shell, place = edged("sheet"), np.array([2.9, 0.1, 0.0])
     above, below = (force(shell, place + z * UP) for z in (1e-9, -1e-9))
     assert above == pytest.approx(below * [1, 1, -1], abs=1e-9)
     assert abs(above[2]) > 1e-5
     for z in (1e-9, -1e-9):
-        energy = _core.Foundation().find(core, place + z * UP, 1.0, 2)[0][5].sum()
-        assert 0 <= energy <= 1e-9
+        assert 0 <= total(shell, place + z * UP)[1] <= 1e-9
     assert_no_jump(shell, [segment(place + [0, 0, 1e-6], place + [0.2, 0.1, 0.3], 5)], 0.1)

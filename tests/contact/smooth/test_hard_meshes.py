@@ -27,15 +27,11 @@ def test_needle() -> None:
 @pytest.mark.parametrize("bulge", [-0.3, 0.3])
 def test_closest_points_of_tall_elements_that_bend(bulge: float) -> None:
     """A waist or a barrel of three rows: no point of its elements is nearer than what is found."""
-    rows, columns = np.linspace(-1.5, 1.5, 4), 2 * np.pi * np.arange(100) / 100
-    z, turn = (one.ravel() for one in np.meshgrid(rows, columns, indexing="ij"))
-    out = np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=1)
-    normals = out + bulge * np.sin(z)[:, None] * UP
+    rows = np.linspace(-1.5, 1.5, 4)
+    vertices, triangles = meshes.revolved(np.stack([1 + bulge * np.cos(rows), rows], axis=1), 100)
+    z = vertices[:, 2:]
+    normals = np.hstack([vertices[:, :2] / (1 + bulge * np.cos(z)), bulge * np.sin(z)])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    a = (100 * np.arange(3)[:, None] + np.arange(100)).ravel()
-    b = a - a % 100 + (a + 1) % 100
-    triangles = np.concatenate([np.stack([a, b, b + 100], 1), np.stack([a, b + 100, a + 100], 1)])
-    vertices = (1 + bulge * np.cos(z))[:, None] * out + z[:, None] * UP
     shell = Shell(vertices, triangles, normals[triangles])
     centers = np.random.default_rng(0).uniform(-2, 2, (1000, 3))
     found = np.abs(shell.closest_points(centers).distances)
@@ -125,10 +121,8 @@ def test_noisy_scan(noise: float) -> None:
     vertices, elements, _ = SURFACES["bowl"].mesh(0.3)
     moved = vertices + noise * DEPTH * np.random.default_rng(0).normal(size=vertices.shape)
     shell = Shell(moved, elements)
-    errors = [
-        np.linalg.norm(push(shell, center) - normal)
-        for center, normal in zip(*SURFACES["bowl"].probes(300, DEPTH), strict=True)
-    ]
+    probes = zip(*SURFACES["bowl"].probes(300, DEPTH), strict=True)
+    errors = [np.linalg.norm(push(shell, center) - normal) for center, normal in probes]
     assert np.mean(errors) <= 1.7 * noise
     assert np.max(errors) <= 6 * noise
 

@@ -9,15 +9,7 @@ from sphshell_pin import Shell
 from sphshell_pin.shell.curvature import curved_mesh
 from tests import meshes
 from tests.contact.helpers import directions, energy, force_sum
-from tests.contact.smooth.hard_cases import (
-    DEPTH,
-    UP,
-    assert_no_jump,
-    fails,
-    find,
-    graph,
-    stored,
-)
+from tests.contact.smooth.hard_cases import DEPTH, UP, assert_no_jump, fails, find, graph, stored
 from tests.contact.smooth.surfaces import cylinder_mesh, given
 from tests.oracle.pieces import potential_and_force
 
@@ -73,9 +65,8 @@ def test_saddle_narrower_than_the_sphere() -> None:
 def test_bowl_narrower_than_the_sphere() -> None:
     """Bowl of a curvature radius below r, touched along a ring; potential of one contact."""
     for cells in (10, 20, 40):
-        assert stored(paraboloid(cells), [0.0, 0.0, HEIGHT], WIDE - NEAREST, WIDE) == (
-            pytest.approx(1.0, abs=0.02)
-        )
+        share = stored(paraboloid(cells), [0.0, 0.0, HEIGHT], WIDE - NEAREST, WIDE)
+        assert share == pytest.approx(1.0, abs=0.02)
 
 
 @fails(RING)
@@ -200,9 +191,8 @@ def test_ball_in_a_countersink(columns: int, error: float) -> None:
 def hole(corners: int, bored: bool) -> Shell:
     """Plate z = 0 with a hole of radius 0.6 round z; `bored`: with the wall of the hole."""
     wall = [(0.6, -0.5), (0.6, -1.0)] if bored else []
-    vertices, triangles = meshes.revolved(
-        [(3.0, 0.0), (2.0, 0.0), (1.2, 0.0), (0.6, 0.0), *wall], corners
-    )
+    sheet = [(3.0, 0.0), (2.0, 0.0), (1.2, 0.0), (0.6, 0.0)]
+    vertices, triangles = meshes.revolved([*sheet, *wall], corners)
     at = vertices[triangles]
     flat = (at[:, :, 2] == 0).all(axis=1)[:, None, None]
     return Shell(vertices, triangles, normals=np.where(flat, UP, at * [-1, -1, 0] / 0.6))

@@ -34,12 +34,8 @@ def test_sheets_that_share_an_edge_touch_there_once(angles, method: str) -> None
     rows, turn = np.linspace(-1.0, 1.0, 4), meshes.random_rotation(3)
     ends = np.stack([np.cos(np.radians(angles)), np.sin(np.radians(angles))], axis=1)
     vertices = np.array([(x, y, z) for y, z in [(0.0, 0.0), *ends] for x in rows])
-    elements = [
-        corners
-        for sheet in range(4, 4 * len(ends) + 1, 4)
-        for k in range(3)
-        for corners in ((k, k + 1, sheet + k + 1), (k, sheet + k + 1, sheet + k))
-    ]
+    cells = [(k, k + 1, at + k + 1, at + k) for at in range(4, len(vertices), 4) for k in range(3)]
+    elements = meshes._split(np.array(cells), np.zeros(len(cells), dtype=bool))
     shell = Shell(vertices @ turn.T, elements)
     for x in np.linspace(-0.9, 0.9, 13):
         for y in (-0.05, 0.0, 0.08):
@@ -68,10 +64,8 @@ def test_flat_tube() -> None:
     across = np.stack([3 * np.cos(turn), 0 * turn, 0.45 * np.sin(turn)], axis=1)
     out = np.stack([0.45 * np.cos(turn), 0 * turn, 3 * np.sin(turn)], axis=1)
     out /= np.linalg.norm(out, axis=1)[:, None]
-    vertices = np.concatenate([across + [0.0, y, 0.0] for y in np.linspace(-2, 2, 9)])
-    first = np.arange(8 * 48)
-    second = first // 48 * 48 + (first + 1) % 48
-    elements = np.stack([first, second, second + 48, first + 48], axis=1)
+    rails = [across + [0.0, y, 0.0] for y in np.linspace(-2, 2, 9)]
+    vertices, elements = meshes.ribbon(rails, closed=True)
     shell = Shell(vertices, elements, normals=np.tile(-out, (9, 1)), crease_angle=1.5)
     assert shell.num_patches == 1
     for z in np.linspace(-0.3, 0.3, 61):

@@ -18,9 +18,9 @@ from sphshell_pin.base.arrays import Array
 from sphshell_pin.shell.contact_set import ContactSet, Feature
 from sphshell_pin.shell.curvature import points_at
 from sphshell_pin.shell.raw import random_places
-from tests.contact.helpers import directions, energy, force_sum
+from tests.contact.helpers import directions, energy
 from tests.contact.smooth.surfaces import mean_edge
-from tests.contact.walks import narrowed
+from tests.contact.walks import change, jump, narrowed
 from tests.shell import test_corpus as corpus
 
 COUNT = int(os.environ.get("SPHSHELL_SPHERES", "1500"))
@@ -28,6 +28,7 @@ WALKS = COUNT // 10
 SUFFIXES = (".stl", ".obj", ".ply", ".off")
 CAD = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 FOLDER = os.environ.get("SPHSHELL_FOLDER")
+REDUCED = sorted((Path(__file__).parents[2] / "data" / "reduced").glob("*.npz"))
 
 # The others are studies.
 SOME = {
@@ -154,19 +155,6 @@ def test_nothing_is_missed(name: str) -> None:
     assert not {int(i): float(missed[i]) for i in np.flatnonzero(~(missed <= 1e-6))}
 
 
-def change(before: ContactSet, after: ContactSet, move: Array) -> tuple[float, float, float]:
-    """Potential that the forces do not account for, potential, and largest force times move."""
-    v0, v1, f0, f1 = energy(before), energy(after), force_sum(before), force_sum(after)
-    size = max(sum(c.terms.depth**1.5) for c in (before, after))
-    return abs(v1 - v0 + (f0 + f1) @ move / 2), max(v0, v1), size * float(np.linalg.norm(move))
-
-
-def jump(before: ContactSet, after: ContactSet, move: Array) -> float:
-    """Jump of the potential between two centres that are near each other, as a share of it."""
-    lost, potential, most = change(before, after, move)
-    return max(lost - most, 0.0) / potential if potential > 0 else 0.0
-
-
 def steepest_between(find, start, end, width):
     """The two centres `width` apart, between `start` and `end`, between which the potential changes
     most beside what the forces account for, by halving."""
@@ -174,13 +162,10 @@ def steepest_between(find, start, end, width):
     def lost(before: tuple[ContactSet, Array], after: tuple[ContactSet, Array]) -> float:
         return change(before[0], after[0], after[1] - before[1])[0]
 
-    return narrowed(
-        lambda center: (find(center), center),
-        start,
-        end,
-        width,
-        lambda first, here, last: lost(first, here) > lost(here, last),
-    )[:2]
+    def goes_left(first, here, last):
+        return lost(first, here) > lost(here, last)
+
+    return narrowed(lambda center: (find(center), center), start, end, width, goes_left)[:2]
 
 
 def beside(some: Spheres):
@@ -208,3 +193,29 @@ def test_potential_does_not_jump(name: str, ways) -> None:
         if not share <= 1e-6:
             jumps[int(i)] = share
     assert not jumps
+
+
+def test_the_reduced_meshes_are_there() -> None:
+    assert len(REDUCED) == 8
+
+
+@pytest.mark.parametrize("path", REDUCED, ids=lambda path: path.stem)
+def test_potential_does_not_jump_on_reduced_meshes(path: Path) -> None:
+    """The smallest meshes, cut out of real surfaces, on which that of earlier versions jumped.
+
+    Each file holds vertices V and corner normals N of triangles T, in units of the sphere's radius,
+    and two centres a, b between which the potential jumped. It does not: between the two, on a
+    longer line through them, and on lines beside it.
+    """
+    mesh, rng = np.load(path), np.random.default_rng(0)
+    shell = Shell(mesh["V"], mesh["T"], normals=mesh["N"])
+    look = partial(shell.contacts, radius=1.0, method="smooth")
+    a, b = mesh["a"], mesh["b"]
+    assert energy(look(a)) > 0
+    along = (b - a) / np.linalg.norm(b - a)
+    lines = [(a, b), (a - 0.01 * along, b + 0.01 * along)]
+    for reach in np.repeat([1e-9, 1e-6, 1e-3, 0.03], 10):
+        lines.append((a + reach * rng.normal(size=3), b + reach * rng.normal(size=3)))
+    for line in lines:
+        start, end = steepest_between(look, *line, 1e-9)
+        assert jump(look(start), look(end), end - start) <= 1e-6

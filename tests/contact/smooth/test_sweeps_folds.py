@@ -1,13 +1,15 @@
-"""A sphere is swept over folds of flat sides: its force does not jump."""
+"""A sphere is swept over folds of flat sides and over smooth joints: its force does not jump."""
 
 from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
 
 from sphshell_pin import Shell
 from tests import meshes
-from tests.contact.smooth.sweeps import DEPTHS, LIMIT, assert_as_defined, assert_continuous
+from tests.contact.smooth import sweeps
+from tests.contact.smooth.surfaces import SURFACES, shell_of
 from tests.studies import mostly_studies
 
 ANGLES = (1, 2, 5, 10, 16, 20, 30, 45, 60, 90, 120, 150, 170)
@@ -63,15 +65,57 @@ folds = partial(mostly_studies, kept=lambda one: one[1] in (2, 20, 120))
 @pytest.mark.parametrize(("kind", "angle", "where"), folds(FOLDS))
 def test_creases(kind: str, angle: float, where: str) -> None:
     shell = fold(kind, angle, 0.5)
-    for depth in DEPTHS:
+    for depth in sweeps.DEPTHS:
         paths = list(fold_paths(kind, angle, depth, where))
-        assert_continuous(shell, paths, depth, limit=1e-7 if angle >= 10 else LIMIT)
+        sweeps.assert_continuous(shell, paths, depth, limit=1e-7 if angle >= 10 else sweeps.LIMIT)
         for path in paths:
-            assert_as_defined(shell, path[1 : -1 : max(1, len(path) // 3)] + 1e-5, depth)
+            sweeps.assert_as_defined(shell, path[1 : -1 : max(1, len(path) // 3)] + 1e-5, depth)
 
 
 @pytest.mark.parametrize(("kind", "angle", "where"), folds(f for f in FOLDS if f[1] <= 30))
 def test_folds_that_count_as_smooth(kind: str, angle: float, where: str) -> None:
     shell = fold(kind, angle, 30.5)
-    for depth in DEPTHS:
-        assert_continuous(shell, fold_paths(kind, angle, depth, where), depth)
+    for depth in sweeps.DEPTHS:
+        sweeps.assert_continuous(shell, fold_paths(kind, angle, depth, where), depth)
+
+
+def rolled(name: str, depth: float, count: int, length: float, nodes: int, seed: int = 0):
+    """Paths over a smooth surface: of constant depth, but on the wavy sheet of constant height."""
+    rng = np.random.default_rng(1000 + seed)
+    for center, normal in zip(*SURFACES[name].probes(count, depth, seed), strict=True):
+        if "wavy" in name:
+            along = np.cross(normal, rng.normal(size=3))
+            yield sweeps.segment(center, center + length * along / np.linalg.norm(along), nodes)
+        else:
+            axis = sweeps.UP if "torus" in name else np.cross(center, rng.normal(size=3))
+            axis = axis / np.linalg.norm(axis)
+            reach = length / np.linalg.norm(np.cross(axis, center))
+            yield sweeps.about(axis, center, np.linspace(0, reach, nodes))
+
+
+SMOOTH = ("bowl", "dome", "torus inside", "wavy above", "wavy below")
+SOME = {("bowl", True), ("torus inside", False), ("wavy above", False)}
+
+
+@pytest.mark.parametrize(
+    ("name", "exact"), mostly_studies(product(SMOOTH, (True, False)), SOME.__contains__)
+)
+def test_smooth_joints(name: str, exact: bool) -> None:
+    for h, count in ((0.6, 6), (0.3, 6), (0.15, 2)):
+        for depth in sweeps.DEPTHS:
+            shell = shell_of(name, h, exact)
+            sweeps.assert_continuous(shell, rolled(name, depth, count, 0.7 * h, 4), depth, 2)
+
+
+@pytest.mark.parametrize("name", ["bowl", "dome"])
+def test_along_mesh_lines(name: str) -> None:
+    """From vertex to vertex the centre is over edges all the way, to round-off."""
+    shell = shell_of(name, 0.6)
+    side = SURFACES[name].sign
+    rng = np.random.default_rng(4)
+    for depth in sweeps.DEPTHS:
+        radius = 4.0 + side * (1 - depth)
+        lines = shell.vertices[rng.choice(shell.edge_vertices, 4)] * (radius / 4.0)
+        paths = [a + np.linspace(-0.3, 1.3, 7)[:, None] * (b - a) for a, b in lines]
+        paths = [p * (radius / np.linalg.norm(p, axis=1)[:, None]) for p in paths]
+        sweeps.assert_continuous(shell, paths, depth)
