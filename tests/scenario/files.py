@@ -12,9 +12,9 @@ from tests import urdf
 from tests.models import pose_of
 from tests.texts import text_of
 
-DROP, FINGER, EGG, HAND, TIP_AT, TWO_BALLS, TWO_ROBOTS = (
+DROP, FINGER, EGG, HAND, TIP_AT, TWO_BALLS = (
     text_of(f"scenarios/{name}.toml")
-    for name in ("drop", "finger", "egg", "hand", "tip_at", "two_balls", "finger_and_ball")
+    for name in ("drop", "finger", "egg", "hand", "tip_at", "two_balls")
 )
 SENSORS = DROP + text_of("scenarios/sensors.toml")
 
