@@ -26,13 +26,11 @@ from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_faul
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf
 from tests.scenario.files import center_of, run_well
-from tests.studies import mostly_studies
 from tests.texts import DATA
 
 PROBE = DATA / "robots" / "arm_with_probe.urdf"
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
 FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
-GRIPPER = DATA / "robots" / "three_fingers.urdf"  # two fingers against one
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
 
@@ -90,64 +88,6 @@ def test_a_closed_body_has_one_side(surface, side, draft):
     assert built.shells[surface].side == side
     (pair,) = built.scene.explain(built.q0, built.v0).pairs
     assert 0 < pair.gap < 0.03
-
-
-HAND = {"robot": GRIPPER, "surface": "box", "tips": "all"}
-REFUSED = [
-    ({"robot": "three_link_finger", "place": "+y"}, r"cannot move along \+y in any posture"),
-    (
-        {"robot": "gear_pair", "frame": "gear_1", "radius": 0.01},
-        "gear_1. cannot move along any axis",
-    ),
-    # The place and the path.
-    ({"at": (1.0, 0.0, 0.0)}, r"\[1, 0, 0\] is 850 mm off the surface"),
-    ({"at": (1.0, 0.0)}, r"must have shape \(3,\)"),
-    ({"path": "spiral"}, "must be line, circle, raster, or points"),
-    ({"path": "1,2; 3,4"}, "must be line, circle, raster, or points"),
-    ({"path": "line", "length": 1.0}, "cannot be taken: .*shorter --length"),
-    ({"length": 0.1}, "belongs to a path of line, circle, raster"),
-    ({"path": [[0, 0, 0.04]], "at": (0, 0, 0.04)}, "leave it out"),
-    # A hand about a part.
-    (HAND | {"surface": "plane"}, "a hand cannot hold a plane"),
-    (HAND | {"place": "below"}, "--place belongs to a single tip"),
-    (HAND | {"radius": 0.01}, "--radius belongs to a single tip"),
-    (HAND | {"robot": "three_link_finger"}, "needs two fingertips or more"),
-    (HAND | {"robot": "turntable"}, "this robot has 1"),
-    (HAND | {"against": "steel", "press": 500.0}, "no grasp .* works"),
-    (HAND | {"unit": "m", "surface": "large.stl"}, "cannot hold a part of 400 x 400 x 400 mm"),
-    (HAND | {"unit": "m", "surface": "sheet.obj"}, "is open, so it has no weight"),
-]
-SLOWER = [
-    ({"robot": "three_link_finger", "press": 1e4}, "allow a push of"),
-    ({"robot": PROBE, "press": 1e3}, r"effort limits allow a push of [\d.]+ N along"),
-    ({"robot": PROBE, "press": 50.0, "material": "silicone"}, "by more than half of it"),
-]
-
-
-@pytest.fixture(scope="module")
-def parts(tmp_path_factory):
-    """A folder with a part that is too large for a hand, and one that is open."""
-    folder = tmp_path_factory.mktemp("parts")
-    trimesh.creation.box((0.4, 0.4, 0.4)).export(folder / "large.stl")
-    (folder / "sheet.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n")
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("options", "match"), mostly_studies(REFUSED + SLOWER, REFUSED.__contains__)
-)
-def test_what_would_not_work_is_refused(
-    options, match, draft, arm, plate, parts, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(parts)
-    asked = {"robot": arm, "surface": plate, "radius": 0.01, **options}
-    if "robot" in options:
-        asked = {"surface": "plane", **options}
-    robot, surface = asked.pop("robot"), asked.pop("surface")
-    with pytest.raises(SphshellError, match=match) as caught:
-        draft(robot, surface, **asked)
-    assert "\n" not in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_robot_on_four_legs_stands(draft):
