@@ -4,7 +4,6 @@ from pathlib import Path
 
 import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -12,6 +11,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.touch_points import sides
 from sphshell_pin.scenario.running.run import simulate
+from tests.models import jacobian_of
 from tests.scenario.files import center_of
 
 GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
@@ -19,12 +19,8 @@ GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
 
 def placed(built):
     """Return the vertices of the surface in the world, and its placement."""
-    (pair,) = built.scene.pairs
-    corners = (
-        pair.side_j.shell.vertices @ pair.side_j.placement.rotation.T
-        + pair.side_j.placement.translation
-    )
-    return corners, pair.side_j.placement
+    (side,) = (pair.side_j for pair in built.scene.pairs)
+    return side.shell.transformed(side.placement).vertices, side.placement
 
 
 def way(built):
@@ -42,11 +38,8 @@ def test_a_part_lies_before_a_bent_arm_as_on_a_table(arm, plate, draft, tmp_path
     (contact,) = made.built.scene.explain(made.built.q0).pairs
     assert contact.gap > 0
     # All six directions of the tip are free, and no joint is at a limit.
-    model, q = made.built.scene.model, made.built.q0
-    jacobian = pin.computeFrameJacobian(
-        model, model.createData(), q, model.getFrameId("link_5"), pin.LOCAL_WORLD_ALIGNED
-    )
-    values = np.linalg.svd(jacobian, compute_uv=False)
+    q = made.built.q0
+    values = np.linalg.svd(jacobian_of(made.built.scene.model, q, "link_5"), compute_uv=False)
     assert values[-1] > 0.02 * values[0]
     assert np.abs(q).max() < 2.75
     assert np.linalg.norm(way(made.built)[-1] - way(made.built)[0]) > 0.05
@@ -80,9 +73,8 @@ def test_a_gantry_slides(plate, draft):
     assert control.rotational_stiffness == 0.0
     result, _ = simulate(made.built)
     moved = np.linalg.norm(result.q[-1][:2] - result.q[0][:2])
-    assert moved == pytest.approx(
-        np.linalg.norm(way(made.built)[-1] - way(made.built)[0]), rel=0.05
-    )
+    first, *_, last = way(made.built)
+    assert moved == pytest.approx(np.linalg.norm(last - first), rel=0.05)
 
 
 def test_a_point_of_the_part_is_touched(arm, plate, draft, tmp_path):

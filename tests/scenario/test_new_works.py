@@ -246,9 +246,8 @@ def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
         frame = robot.model.frames[link]
         at = frame.placement * pin.SE3(np.eye(3), np.array([0, 0, 0.05]))
         geometry.addGeometryObject(pin.GeometryObject("end", frame.parentJoint, link, at, shape))
-        (tip,) = find_tips(
-            replace(robot, collision_model=geometry), shipped=None, frame=None, radius=None
-        )
+        ended = replace(robot, collision_model=geometry)
+        (tip,) = find_tips(ended, shipped=None, frame=None, radius=None)
         assert radius is None or tip.radius == pytest.approx(radius, rel=0.03)
         assert tip.offset == pytest.approx([0, 0, 0.1 + above * tip.radius], abs=1e-3)
         assert words in tip.source
@@ -321,9 +320,8 @@ def test_a_tip_may_stay_behind_the_end_of_its_path_by_a_part_of_its_radius(aside
     radius, place = 0.05, pin.SE3(pin.utils.rotate("x", 0.3), np.array([0.1, 0.2, 0.3]))
     scene = sp.Scene(models.ball(joint=pin.JointModelTranslation()))
     tip = Tip("ball", radius, np.array([0.01, 0.0, 0.02]), "")
-    scene.add_contact(
-        sp.Sphere(radius, "ball", tip.offset), models.plate(), placement=place, law=models.LAW
-    )
+    sphere = sp.Sphere(radius, "ball", tip.offset)
+    scene.add_contact(sphere, models.plate(), placement=place, law=models.LAW)
     start, end = (place.act(np.add(one, [0, 0, radius])) - tip.offset for one in PATH)
     behind = end - place.rotation @ [aside * radius, 0.0, 0.0]
     plan = SimpleNamespace(control=pressing(PATH), tips=(tip,))
