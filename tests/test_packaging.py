@@ -195,9 +195,8 @@ def test_a_wheel_is_refused_with(file, data, said, faults_of):
 def test_symbols_must_be_those_of_the_tag(tag, newer, faults_of):
     names = "GLIBC_2.2.5 GLIBC_2.28 GLIBC_2.35 GLIBCXX_3.4.24 GLIBCXX_3.4.30 CXXABI_1.3.9"
     symbols = "".join(f"\0{name}" for name in names.split()) + "\0"
-    faults = faults_of(
-        {CORE: GOOD[CORE] + symbols.encode()}, f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
-    )
+    wheel = f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
+    faults = faults_of({CORE: GOOD[CORE] + symbols.encode()}, wheel)
     assert faults == ([f"{CORE} needs {newer}, which {tag[:14]} does not have"] if newer else [])
 
 
