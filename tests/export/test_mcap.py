@@ -89,9 +89,8 @@ def test_the_numbers_of_rows_are_those_of_the_result(finger):
         np.testing.assert_array_equal(read.numbers(f"/energy/{part}", "data"), values)
     rows = result.row_columns()
     for topic, column in (("normal_force", "normal_force [N]"), ("depth", "depth [m]")):
-        np.testing.assert_array_equal(
-            read.numbers(f"/contacts/tip_wall/{topic}", "data"), rows[f"pairs.tip-wall.{column}"]
-        )
+        sent = read.numbers(f"/contacts/tip_wall/{topic}", "data")
+        np.testing.assert_array_equal(sent, rows[f"pairs.tip-wall.{column}"])
     assert max(rows["pairs.tip-wall.normal_force [N]"]) > 0.1
 
 

@@ -63,17 +63,11 @@ def seen(home, tmp_path_factory, request):
     else:
         (work / "here" / "run").symlink_to(home / "results")
     out = work / "noticed.json"
-    program = Path(__file__).with_name("looking.py")
-    repository = Path(__file__).parents[2]
+    program, repository = Path(__file__).with_name("looking.py"), Path(__file__).parents[2]
+    command = [sys.executable, program, repository, out, home / "all.toml"]
     try:
-        done = subprocess.run(
-            [sys.executable, program, repository, out, home / "all.toml"],
-            cwd=work / "here",
-            env={**os.environ, "TMPDIR": str(work / "temporary")},
-            capture_output=True,
-            timeout=500,
-            check=False,
-        )
+        more = {"cwd": work / "here", "env": {**os.environ, "TMPDIR": str(work / "temporary")}}
+        done = subprocess.run(command, capture_output=True, timeout=500, check=False, **more)
     finally:
         if request.param == "alone":
             hidden.rename(home)

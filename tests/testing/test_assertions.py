@@ -145,19 +145,10 @@ momentum, lossless = testing.assert_momentum_kept, testing.assert_lossless_energ
     [
         ("touches the universe", lambda: wrenches(arm_scene(), ARM_Q)),
         ("mass matrix is singular", lambda: balance(massless(), ARM_Q)),
-        (
-            r"tau has shape \(2,\)|tau = \(2,\)",
-            lambda: balance(arm_scene(), ARM_Q, tau=[0, 0]),
-        ),
+        (r"tau has shape \(2,\)|tau = \(2,\)", lambda: balance(arm_scene(), ARM_Q, tau=[0, 0])),
         ("gravity", lambda: momentum(run_of(arm_scene(), ARM_Q, ARM_V, 1e-3))),
-        (
-            "nothing touched",
-            lambda: momentum(run_of(two_free_bodies(LAW), *FAR)),
-        ),
-        (
-            "not touch the universe",
-            lambda: momentum(run_of(FIXED, *SHORT)),
-        ),
+        ("nothing touched", lambda: momentum(run_of(two_free_bodies(LAW), *FAR))),
+        ("not touch the universe", lambda: momentum(run_of(FIXED, *SHORT))),
         ("must know its scene", lambda: momentum(replace(closed_run(sp.Adaptive()), scene=None))),
         ("without damping, friction", lambda: lossless(run_of(arm_scene(), ARM_Q, ARM_V, 0.01))),
         ("must be 'both'", lambda: testing.assert_no_contact_missed(plate(side="outside"), 0.1)),
