@@ -28,7 +28,7 @@ from tests import models, urdf
 from tests.scenario.files import center_of, run_well
 from tests.texts import DATA
 
-PROBE = DATA / "robots" / "arm_with_probe.urdf"
+PROBE, BIPED = (DATA / "robots" / name for name in ("arm_with_probe.urdf", "biped.xml"))
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
 FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
@@ -111,22 +111,9 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(draft)
 
 
 def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
-    inertial = '<inertial pos="0 0 0" mass="{}" diaginertia="0.1 0.1 0.1"/>'
-    legs = "".join(
-        f'<body name="{side}" pos="0 {y} -0.1"><joint name="{side}_hip" axis="0 1 0"/>'
-        f'<joint name="{side}_knee" axis="0 1 0" pos="0 0 -0.2"/>{inertial.format(1)}'
-        f'<geom name="{side}_foot" type="sphere" size="0.02" pos="0.1 0 -0.4"/></body>'
-        for side, y in (("left", 0.2), ("right", -0.2))
-    )
-    robot = tmp_path / "biped.xml"
-    base = inertial.format(3)
-    robot.write_text(
-        f'<mujoco><worldbody><body name="base" pos="0 0 0.6"><freejoint/>{base}{legs}</body>'
-        "</worldbody></mujoco>"
-    )
     block = tmp_path / "block.stl"
     trimesh.creation.box((0.1, 0.1, 0.02)).export(block)
-    made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
+    made = new_scenario(BIPED, block, unit="m", out=tmp_path / "a.toml")
     assert "comes down beside the surface" in made.why[0]
     assert build(made.path).scene.model.nv <= 4
 

@@ -24,6 +24,7 @@ from sphshell_pin.scenario.drafting.searching import CannotReach
 from sphshell_pin.scenario.drafting.trial import Fault
 from tests import urdf
 from tests.scenario.limbs import ball, limb, link
+from tests.texts import DATA
 from tests.urdf import shape
 
 
@@ -240,15 +241,8 @@ def test_the_ball_of_a_mechanism_in_a_plane_is_in_that_plane(load) -> None:
     assert tip.offset[2] < -0.03
 
 
-def test_a_body_of_an_mjcf_is_no_tool_frame_where_its_joint_is_elsewhere(tmp_path: Path) -> None:
-    file = tmp_path / "leg.xml"
-    file.write_text(
-        '<mujoco><worldbody><body name="leg"><joint axis="0 1 0"/><geom type="capsule" size=".05" '
-        'fromto="0 0 0 0 0 -.4"/><body name="foot" pos="0 0 -.6"><joint axis="0 1 0" pos="0 0 .2"/>'
-        '<geom type="capsule" size=".06" fromto="-.1 0 .2 .2 0 .2"/></body></body></worldbody>'
-        "</mujoco>"
-    )
-    (tip,) = tips_of(robots.load_file(file))
+def test_a_body_of_an_mjcf_is_no_tool_frame_where_its_joint_is_elsewhere() -> None:
+    (tip,) = tips_of(robots.load_file(DATA / "robots" / "leg.xml"))
     assert tip.offset[2] > 0.1
 
 

@@ -14,6 +14,7 @@ from sphshell_pin.scenario.format.reach import Reach
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf
 from tests.scenario.limbs import ball, limb, link
+from tests.texts import DATA
 from tests.urdf import shape
 
 
@@ -189,18 +190,8 @@ def test_a_joint_that_moves_nothing_is_held(draft_of) -> None:
     assert "held, as nothing that they move has a mass: joints 'c'" in made.why
 
 
-def test_couplings_that_no_model_has_leave_their_joints_free(draft, tmp_path: Path) -> None:
-    file = tmp_path / "jaws.xml"
-    file.write_text(
-        """<mujoco><worldbody><body name="arm"><joint name="a" axis="0 1 0"/>
-        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/>
-        <body name="hand" pos="0 0 .3"><joint name="b" axis="0 1 0"/>
-        <geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/></body></body></worldbody>
-        <tendon><fixed name="t"><joint joint="a" coef="1"/><joint joint="b" coef="1"/></fixed>
-        </tendon>
-        <equality><tendon tendon1="t"/></equality></mujoco>"""
-    )
-    made = draft(file, "plane")
+def test_couplings_that_no_model_has_leave_their_joints_free(draft) -> None:
+    made = draft(DATA / "robots" / "jaws.xml", "plane")
     assert made.why[0].startswith("joints that are coupled move freely (--no-mimic)")
     assert not made.built.scenario.robot[0].mimic
 
@@ -226,14 +217,7 @@ def test_a_ball_between_walls_is_carried_out_of_them(draft, draft_of, tmp_path: 
         draft(tmp_path / "robot.urdf", frame="tip", radius=0.01)
 
 
-def test_what_stands_beside_a_free_body_is_not_carried_by_it(draft, tmp_path: Path) -> None:
-    file = tmp_path / "scene.xml"
-    geom = '<geom type="capsule" size=".02" fromto="0 0 0 0 0 .3"/>'
-    file.write_text(
-        '<mujoco><worldbody><body name="object" pos="1 0 0"><freejoint/><geom size=".05"/></body>'
-        f'<body name="upper"><joint name="a" axis="0 1 0"/>{geom}<body name="lower" pos="0 0 .3">'
-        f'<joint name="b" axis="0 1 0"/>{geom}</body></body></worldbody></mujoco>'
-    )
-    made = draft(file, "plane")
+def test_what_stands_beside_a_free_body_is_not_carried_by_it(draft) -> None:
+    made = draft(DATA / "robots" / "arm_beside_object.xml", "plane")
     assert made.built.scenario.robot[0].base == "fixed"
     assert settled(made) == pytest.approx(1.0, abs=0.05)
