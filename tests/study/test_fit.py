@@ -43,34 +43,35 @@ def noisy(columns, share, seed=0):
     }
 
 
-def test_a_straight_line_has_its_closed_form(bounce):
-    """z = z0 + v0 t - g t^2 / 2 is linear in g: value and interval are those of regression."""
+def measured(path, t, names, share=0.02, changes=None):
+    """Return noisy data of a run of the scenario."""
+    return {"t [s]": t, **noisy(columns_of(path, t, names, changes), share)}
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_a_straight_line_has_its_closed_form(bounce, given):
+    """z = z0 + v0 t - g t^2 / 2 is linear in g: value and interval are those of regression.
+
+    With given deviations, of which half are ten times as small, they are those of weighted
+    regression.
+    """
     t = np.linspace(0.0, 0.005, 41)
-    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + 1e-4 * np.random.default_rng(3).normal(size=41)
-    found = sp.fit(bounce, {"t [s]": t, f"{HEIGHT} [m]": z}, ["gravity.2"])
-    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
+    sigma = np.where(given & (np.arange(41) % 2 == 1), 1e-5, 1e-4)
+    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + sigma * np.random.default_rng(3).normal(size=41)
+    data = {"t [s]": t, f"{HEIGHT} [m]": z}
+    data |= {f"{HEIGHT}.sigma [mm]": 1e3 * sigma} if given else {}
+    found = sp.fit(bounce, data, ["gravity.2"])
+    slope, y = 0.5 * t**2 / sigma, (z - 0.017 + 0.5 * t) / sigma
     value = slope @ y / (slope @ slope)
-    sigma = math.sqrt(np.sum((y - value * slope) ** 2) / 40)
-    half = stats.t.ppf(0.975, 40) * sigma / math.sqrt(slope @ slope)
+    spread = 1.0 if given else math.sqrt(np.sum((y - value * slope) ** 2) / 40)
+    half = stats.t.ppf(0.975, 40) * spread / math.sqrt(slope @ slope)
     one = found["gravity.2"]
     assert found.dof == 40
     assert one.value == pytest.approx(value, rel=1e-6)
     assert (one.low, one.high) == pytest.approx((value - half, value + half), rel=1e-5)
-    assert found.series[0].rms == pytest.approx(sigma * math.sqrt(40 / 41), rel=1e-6)
-
-
-def test_given_deviations_weight_the_data(bounce):
-    """Half of the rows are ten times as exact; the closed form is that of weighted regression."""
-    t = np.linspace(0.0, 0.005, 41)
-    sigma = np.where(np.arange(41) % 2, 1e-5, 1e-4)
-    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + sigma * np.random.default_rng(4).normal(size=41)
-    data = {"t [s]": t, f"{HEIGHT} [m]": z, f"{HEIGHT}.sigma [mm]": 1e3 * sigma}
-    one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
-    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
-    information = np.sum((slope / sigma) ** 2)
-    assert one.value == pytest.approx(np.sum(slope * y / sigma**2) / information, rel=1e-6)
-    half = stats.t.ppf(0.975, 40) / math.sqrt(information)
-    assert one.high - one.value == pytest.approx(half, rel=1e-4)
+    if not given:
+        rms = spread * sigma[0] * math.sqrt(40 / 41)
+        assert found.series[0].rms == pytest.approx(rms, rel=1e-6)
 
 
 def test_the_noise_of_each_column_is_its_own(bounce):
@@ -139,8 +140,7 @@ def test_noise_has_a_pattern_in_one_of_a_hundred_fits():
 
 def test_what_a_fit_does_not_explain_is_said(bounce):
     """A linear spring in place of Hertz's: pulses of another shape."""
-    t = np.linspace(0.0, 0.2, 401)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 401), [FORCE])
     linear = {"contact.tip.law.exponent": 1.0, STIFFNESS: 1e4}
     found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes=linear)
     assert any(one.startswith(f"the fit does not explain {FORCE} of") for one in found.remarks)
@@ -155,8 +155,7 @@ REST = {
 
 @pytest.mark.parametrize("name", [FORCE, "pairs.tip.depth"])
 def test_damping_cannot_be_seen_at_rest(bounce, name):
-    t = np.linspace(0.01, 0.2, 191)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [name], REST), 0.02)}
+    data = measured(bounce, np.linspace(0.01, 0.2, 191), [name], changes=REST)
     found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes=REST)
     assert not found[DISSIPATION].determined
     begin = f"the data do not determine {DISSIPATION}: "
@@ -165,8 +164,7 @@ def test_damping_cannot_be_seen_at_rest(bounce, name):
 
 
 def test_what_no_column_feels_is_said(bounce):
-    t = np.linspace(0.0, 0.2, 101)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 101), [FORCE])
     found = sp.fit(bounce, data, [STIFFNESS, FRICTION])
     assert found[STIFFNESS].determined
     assert not found[FRICTION].determined
@@ -183,8 +181,7 @@ def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
     path.write_text(
         SCENARIO.replace('{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }', law)
     )
-    t = np.linspace(0.0, 0.1, 101)
-    data = {"t [s]": t, **noisy(columns_of(path, t, [FORCE]), 0.01)}
+    data = measured(path, np.linspace(0.0, 0.1, 101), [FORCE], 0.01)
     keys = ["contact.tip.law.young", "contact.tip.law.young_2"]
     found = sp.fit(path, data, keys)
     assert not found.determined
@@ -195,8 +192,7 @@ def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
 
 
 def test_a_value_at_its_bound_is_said(bounce):
-    t = np.linspace(0.0, 0.2, 401)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 401), [FORCE])
     wanted = {STIFFNESS: None, DISSIPATION: (0.35, 0.6)}
     found = sp.fit(bounce, data, wanted, changes={DISSIPATION: 0.4})
     assert found[DISSIPATION].at_bound
@@ -205,14 +201,11 @@ def test_a_value_at_its_bound_is_said(bounce):
 
 
 def test_wrong_deviations_are_said(bounce):
-    t = np.linspace(0.0, 0.1, 201)
-    columns = noisy(columns_of(bounce, t, [FORCE]), 0.02)
-    largest = float(np.max(next(iter(columns.values()))))
-    data = {"t [s]": t, **columns}
+    data = measured(bounce, np.linspace(0.0, 0.1, 201), [FORCE])
 
     def remarks(share):
-        sigma = {f"{FORCE}.sigma [N]": np.full(len(t), share * largest)}
-        return sp.fit(bounce, {**data, **sigma}, [STIFFNESS]).remarks
+        sigma = {f"{FORCE}.sigma [N]": np.full(201, share * data[f"{FORCE} [N]"].max())}
+        return sp.fit(bounce, data | sigma, [STIFFNESS]).remarks
 
     assert not remarks(0.02)
     (remark,) = remarks(0.01)
@@ -239,9 +232,8 @@ def test_experiments_of_their_own_settings_are_fitted_together(bounce):
 
 def test_keys_with_one_value(bounce):
     both = "contact.tip.friction.mu_static+contact.tip.friction.mu_dynamic"
-    t = np.linspace(0.0, 0.1, 201)
     same = {"contact.tip.friction.mu_static": "0.2"}
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, ["pairs.tip.force_x"], same), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.1, 201), ["pairs.tip.force_x"], changes=same)
     changes = dict.fromkeys(both.split("+"), 0.1)
     found = sp.fit(bounce, data, [both], changes=changes)
     assert found[both].value == pytest.approx(0.2, rel=0.02)

@@ -16,6 +16,7 @@ from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
 from tests.command import refused
 from tests.study.fitted_sets import SCENARIO
+from tests.tables import cases_of
 
 HEIGHT = "q.root_joint.2"
 HEAD = f"t [s],{HEIGHT} [m]\n"
@@ -71,39 +72,8 @@ def test_columns_may_be_chosen(read):
         read(text, only=["depth"])
 
 
-WRONG = {
-    "empty": ("", "is empty"),
-    "comments alone": ("# a\n\n,,\n", "is empty"),
-    "a header alone": (HEAD, "has no rows of data"),
-    "no header": ("0,1\n1,2\n", "line 1: the first line must be a header"),
-    "no time": (f"{HEIGHT} [m]\n1\n", r"has no column 't \[s\]'; its columns are: q\.root_joint"),
-    "time alone": ("t [s]\n0\n0.1\n", "has no column of data"),
-    "no unit": (f"t [s],{HEIGHT}\n0,1\n", rf"needs its unit in the header: '{HEIGHT} \[m\]'"),
-    "no unit of time": (f"t,{HEIGHT} [m]\n0,1\n", r"'t' needs its unit .*'t \[s\]'"),
-    "unit of another kind": (f"t [s],{HEIGHT} [N]\n0,1\n", r"in \[N\] must be in one of: m, "),
-    "unknown unit of time": (f"t [h],{HEIGHT} [m]\n0,1\n", "must be in one of: s, ms, us"),
-    "unknown column": ("t [s],force [N]\n0,1\n", "no quantity 'force'; the nearest are pairs.tip"),
-    "two of one name": (f"t [s],{HEIGHT} [m],{HEIGHT} [m]\n0,1,1\n", "two columns are called"),
-    "the same in two units": (f"t [s],{HEIGHT} [m],{HEIGHT} [mm]\n0,1,1\n", "two columns are"),
-    "backwards": (HEAD + "0,1\n0.2,1\n\n0.1,1\n", "line 5: time 0.1 s is before that of the row"),
-    "twice": (HEAD + "0,1\n0.2,1\n0.2,1\n", "line 4: time 0.2 s is the same as that of the row"),
-    "time nan": (HEAD + "0,1\nnan,1\n", "line 3: 'nan' in column 't .s.' is not a finite number$"),
-    "time missing": (HEAD + "0,1\n,1\n", "line 3: the time is missing"),
-    "value nan": (HEAD + "0,1\n0.1,nan\n", "line 3: 'nan' .* leave the cell empty where"),
-    "underscore": (HEAD + "0,1\n0.1,1_0\n", "line 3: '1_0' in column .* is not a finite number"),
-    "a word": (HEAD + "0,1\n0.1,high\n", "line 3: 'high' in column .* is not a finite number"),
-    "semicolons": ("t [s];x [m]\n0;1,5\n", "line 1: columns must be separated by commas"),
-    "decimal commas": (HEAD + "0,06,1\n", "line 2: has 3 values, the header has 2 columns"),
-    "a short row": (HEAD + "0,1\n0.1\n", "line 3: has 1 values"),
-    "after the run": (HEAD + "0,1\n9,1\n", "line 3: time 9 s is after the end of the run, 0.25 s"),
-    "before the run": (HEAD + "-1,1\n0,1\n", "line 2: time -1 s is before the start"),
-    "no value": (HEAD + "0,\n0.1,\n", f"column '{HEIGHT}' has no value"),
-    "sigma 0": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,0\n", "line 2: .* must be positive"),
-    "sigma missing": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,\n", "must be positive"),
-    "sigma of nothing": (f"t [s],{HEIGHT} [m],v.a.sigma [m]\n0,1,1\n", "has no column 'v.a' to"),
-    "not UTF-8": (HEAD.encode() + b"0,\xff\n", "is not a text file in UTF-8"),
-    "an open quote": ('"t [s],x [m]\n0,1\n', "is not a csv file"),
-}
+WRONG = cases_of("wrong_measurements")
+WRONG["not UTF-8"] = HEAD.encode() + b"0,\xff\n", "is not a text file in UTF-8"
 
 
 @pytest.mark.parametrize("case", WRONG)

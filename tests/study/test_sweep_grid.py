@@ -9,6 +9,7 @@ import pytest
 from sphshell_pin.errors import InvalidParameter, NameNotFound, ScenarioError, SphshellError
 from sphshell_pin.study.sweep import grid_of, plan_sweep
 from tests.study.resting import write
+from tests.tables import cases_of
 
 KEY = "contact.law.stiffness"
 
@@ -58,25 +59,7 @@ def test_the_last_key_turns_fastest():
 
 
 @pytest.mark.parametrize(
-    ("vary", "words"),
-    [
-        ([], "what varies"),
-        (["no_equals"], "key=lo:hi:n"),
-        (["k=1:2"], "lo:hi:n"),
-        (["k=1:2:1"], "2 or more"),
-        (["k=1:2:lin:4"], "lo:hi:log:n"),
-        (["k=0:2:log:4"], "positive"),
-        (["k=2:2:4"], "differ"),
-        (["k=1,2,1"], "given twice"),
-        (["k=1e3,1000"], "given twice"),
-        (["k=1:1e400:3"], "finite"),
-        (["k=1,2", "k=3"], "given twice"),
-        ({"k": []}, "at least one"),
-        ({"k": [None]}, "numbers, words"),
-        ({"k": 3}, "list of values"),
-        ("no_equals", "no_equals"),
-        (["a=0:1:2000", "b=0:1:2000"], "too many"),
-    ],
+    ("vary", "words"), [({"k": [None]}, "numbers, words"), *cases_of("wrong_sweeps")["values"]]
 )
 def test_wrong_values_are_told(vary, words):
     with pytest.raises(InvalidParameter, match=words):

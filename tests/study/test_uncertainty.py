@@ -12,6 +12,7 @@ from sphshell_pin.plot.uncertainty import plot_uncertainty
 from sphshell_pin.study.sweep import plan_sweep, quantiles, sample_of, sobol_indices, sweep
 from tests.command import succeed
 from tests.study.resting import GRAVITY
+from tests.tables import cases_of
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
@@ -66,23 +67,7 @@ def test_quantiles_are_those_of_the_textbook():
     np.testing.assert_allclose(found, [[8, 10, 12], 10 + 2 * shares, [4, 6, 9]], rtol=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("dist", "words"),
-    [
-        ({}, "must say what is uncertain"),
-        (["a"], "must be KEY=DISTRIBUTION, one of normal"),
-        (["a=normal"], r"must be one of normal\(mean,deviation\), uniform"),
-        (["a=gauss(1,2)"], "must be one of normal"),
-        (["a=normal(1;2)"], "must be one of normal"),
-        (["a=normal(1,-2)"], "must have deviation > 0"),
-        (["a=uniform(2,1)"], "must have low < high"),
-        (["a=lognormal(12.2,0.4)"], "must have median > 0, factor > 1"),
-        (["a=normal(1,2)", "a=normal(1,3)"], "a' is given twice"),
-        (["a=uniform(-1e308,1e308)"], "not finite"),
-        ({"a": [1, 2]}, "must be one of normal"),
-        (3, "must map keys to distributions"),
-    ],
-)
+@pytest.mark.parametrize(("dist", "words"), cases_of("wrong_sweeps")["distributions"])
 def test_wrong_distributions_are_told(dist, words):
     with pytest.raises(InvalidParameter, match=words):
         sample_of(dist, 8)
