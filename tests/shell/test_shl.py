@@ -5,6 +5,7 @@ import pytest
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, ShellFileError
 from sphshell_pin.shell import Shell
+from tests.tables import cases_of
 
 from .surfaces import CUBE, CUBE_QUADS, areas, expect
 
@@ -128,25 +129,14 @@ def test_truncated_anywhere_is_said(write, lines):
             assert caught.value.line is None or 1 <= caught.value.line <= len(some)
 
 
+WRONG = cases_of("wrong_shl")["lines"]
 FLAT = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
 
 
 @pytest.mark.parametrize(
     ("lines", "line", "said"),
     [
-        ({9: "4 1 3 9 2"}, 10, r"point 9\b.*1 to 8"),
-        ({9: "4 1 3 0 2"}, 10, "point 0"),
-        ({9: "2 1 3"}, 10, "2 corners"),
-        ({9: "3 1 3 4 2"}, 10, "4 indices follow"),
-        ({9: "4 1 3.5 4 2"}, 10, "whole numbers"),
-        ({4: "1.0 2.0"}, 5, "line 5"),
-        ({4: "1.0 2.0 nan"}, None, "vertex 4 is not finite"),
-        ({4: "1.0 2.0e 3"}, 5, "line 5"),
-        ({0: "8 6 -1.0"}, 1, "SCALE"),
-        ({0: "8 6"}, 1, "header"),
-        ({0: "8.5 6 1"}, 1, "whole number"),
-        ({0: "Version: 3"}, 1, "version 3"),
-        ({0: "8 0 1.0"}, 1, "no surface"),
+        *(({row: text}, line or None, said) for row, text, line, said in WRONG),
         (["solid cube"], None, "no numbers"),
         (FLAT, None, "no element is left"),
     ],
