@@ -1,9 +1,9 @@
 """Models of MuJoCo for the tests of its adapter."""
 
-import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from tests import models
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -32,9 +32,8 @@ def sliding(option: str) -> str:
     )
 
 
-def plate(size: float = 1.0) -> sp.Shell:
-    corners = size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    return sp.Shell(corners, [[0, 1, 2, 3]], name="plate")
+def plate(half: float = 1.0) -> sp.Shell:
+    return models.square(2 * half)
 
 
 def slab(count: int, radius: float = 0.02) -> str:
