@@ -136,9 +136,8 @@ def test_equalities_of_joints_are_mimic_joints():
 def test_equalities_hold_between_distances_from_the_reference(tmp_path):
     """j1 - 0.2 = 0.1 + 0.5 (j2 - 0.3), of which j1 is the coordinate."""
     joints = ARM.replace('"j1"', '"j1" ref="0.2"').replace('"j2"', '"j2" ref="0.3"')
-    path = written(tmp_path, joints, '<compiler angle="radian"/>')
-    end = '<equality><joint joint1="j1" joint2="j2" polycoef="0.1 0.5"/></equality></mujoco>'
-    path.write_text(path.read_text().replace("</mujoco>", end))
+    equality = '<joint joint1="j1" joint2="j2" polycoef="0.1 0.5"/>'
+    path = written(tmp_path, joints, '<compiler angle="radian"/>', equality)
     (rule,) = mimics(robots.load_file(path, mimic=True).model).values()
     assert (rule.ratio, rule.offset) == pytest.approx((2.0, -2.0 * (0.2 + 0.1 - 0.5 * 0.3)))
 
@@ -170,9 +169,10 @@ def test_what_is_not_modeled_is_said():
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 
 
-def written(tmp_path, inside, head=""):
+def written(tmp_path, inside, head="", equality=""):
     path = tmp_path / "r.xml"
-    path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody></mujoco>")
+    end = f"<equality>{equality}</equality>" if equality else ""
+    path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody>{end}</mujoco>")
     return path
 
 
@@ -199,9 +199,7 @@ COUPLED = {
 
 @pytest.mark.parametrize("equality", COUPLED)
 def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality):
-    words, path = COUPLED[equality], written(tmp_path, ARM)
-    end = f"<equality>{equality}</equality></mujoco>"
-    path.write_text(path.read_text().replace("</mujoco>", end))
+    words, path = COUPLED[equality], written(tmp_path, ARM, equality=equality)
     with pytest.raises(robots.RobotError, match=rf"not supported: .*{words}.*mimic = false"):
         robots.load_file(path, mimic=True)
     with pytest.warns(RobotWarning, match=rf"move freely that the file couples: .*{words}"):

@@ -115,23 +115,7 @@ def test_an_expression_that_escapes_is_in_a_process_that_does_nothing(tmp_path, 
 
 
 def test_xacro_expressions_compute(tmp_path):
-    values = {
-        "'a'.upper() + str(max([round(x) for x in (1.2, 3.7)]))": "A4",
-        "radians(90) == pi / 2 if 1 < 2 else 0": True,
-        "_tmp_ + 1": 4,
-        "dict(a=1, **dict(b=2))['b']": 2,
-        "', '.join(sorted(['b', 'a'])[::-1])": "b, a",
-        "python.isinstance(_tmp_, python.int) and not _tmp_ in [1, 2]": True,
-        "[a * b for a, b in python.zip([1, 2], [3, 4]) if a > 1]": [8],
-        "f.format(1, name=2)": "1  2.00",
-        "'%d %s' % (1, 'a')": "1 a",
-        "xacro.tokenize('a, b;c')": ["a", "b", "c"],
-        "2**3 // 5 % 2 << 2": 4,
-        "list(map(str, python.range(2)))": ["0", "1"],
-        "1 if 1 < 2 < 2 else python.sum(x for x in [1, 2])": 3,
-        "max(['aa', 'b'], key=len).count('a')": 2,
-        "'a_b'.split('_').pop()": "b",
-    }
+    values = EXPRESSIONS["computed"]
     start = "<xacro:property name='_tmp_' value='3'/>"
     start += "<xacro:property name='f' value='{} {name:5.2f}'/>"
     texts = "".join(f'<a b="${{{escape(text)}}}"/>' for text in values)
