@@ -30,7 +30,8 @@ def run_well(built):
     """Run a scenario; it comes to its end, and to all figures that it expects."""
     result, stopped = simulate(built)
     assert stopped is None
-    assert [one.figure for one in judge(built, result) if not one.met] == []
+    missed = [one for one in judge(built, result) if not one.met]
+    assert [(one.figure, one.measured, one.expected) for one in missed] == []
     return result
 
 

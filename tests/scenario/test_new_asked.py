@@ -87,34 +87,32 @@ def test_a_point_of_the_part_is_touched(arm, plate, draft, tmp_path):
     np.testing.assert_allclose(placed(built)[1].rotation @ [1, 0, 0], [0, 0, 1], atol=1e-9)
 
 
-def test_a_face_is_touched_by_its_kind_and_size(arm, tmp_path):
+def test_a_face_is_touched_by_its_kind_and_size(arm, draft, tmp_path):
     """A cylinder of 40 mm on its end: its mantle, or the larger of its planes."""
     sp.Shell.from_geometry(coal.Cylinder(0.04, 0.1)).to_file(tmp_path / "rod.shl")
-    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
     for text in ("cylinder", "cylinder 40 mm", "cylinders of radius 40 mm"):
-        built = new_scenario(arm, tmp_path / "rod.shl", at=text, **options).built
+        built = draft(arm, tmp_path / "rod.shl", radius=0.01, at=text).built
         assert np.linalg.norm(way(built)[0][:2]) == pytest.approx(0.04, rel=2e-3)
-    built = new_scenario(arm, tmp_path / "rod.shl", at="plane", **options).built
+    built = draft(arm, tmp_path / "rod.shl", radius=0.01, at="plane").built
     assert abs(way(built)[0][2]) == pytest.approx(0.05, abs=1e-6)
     with pytest.raises(SphshellError, match=r"has no face 'cylinder 30 mm'; .*radius 40 mm"):
-        new_scenario(arm, tmp_path / "rod.shl", at="cylinder 30 mm", **options)
+        draft(arm, tmp_path / "rod.shl", radius=0.01, at="cylinder 30 mm")
     with pytest.raises(SphshellError, match=r"no face 'lid': give x,y,z"):
-        new_scenario(arm, tmp_path / "rod.shl", at="lid", **options)
+        draft(arm, tmp_path / "rod.shl", radius=0.01, at="lid")
 
 
 def length_of(points):
     return np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
 
 
-def test_the_path_has_the_shape_and_length_asked_for(arm, plate, tmp_path):
-    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
-    line = way(new_scenario(arm, plate, path="line", length=0.08, **options).built)
+def test_the_path_has_the_shape_and_length_asked_for(arm, plate, draft):
+    line = way(draft(arm, plate, radius=0.01, path="line", length=0.08).built)
     assert length_of(line) == pytest.approx(0.08, abs=0.005)
-    circle = way(new_scenario(arm, plate, path="circle", length=0.1, **options).built)
+    circle = way(draft(arm, plate, radius=0.01, path="circle", length=0.1).built)
     np.testing.assert_allclose(circle[0], circle[-1], atol=1e-5)
     away = np.linalg.norm(circle[:-1] - circle[:-1].mean(axis=0), axis=1)
     np.testing.assert_allclose(away, 0.1 / (2 * np.pi), rtol=1e-2)
-    made = new_scenario(arm, plate, path="raster", length=0.12, **options)
+    made = draft(arm, plate, radius=0.01, path="raster", length=0.12)
     raster = way(made.built)
     assert len(raster) == 10
     assert length_of(raster) == pytest.approx(0.12, rel=1e-3)

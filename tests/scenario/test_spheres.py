@@ -51,8 +51,7 @@ def test_the_table_of_many_contacts_lists_the_largest(tmp_path):
     )
     start, end = TWO_BALLS.index("spheres = ["), TWO_BALLS.index('shell = "plate"')
     file = write(tmp_path, f"{TWO_BALLS[:start]}spheres = [{spheres}]\n{TWO_BALLS[end:]}")
-    options = ["run", str(file), "--out", str(tmp_path / "out"), "--no-recording"]
-    told = call(*options).output
+    told = call("run", file, "--out", tmp_path / "out", "--no-recording").output
     assert "floor/lower/ball-0 " in told
     assert "floor/lower/ball-19" not in told
     assert "5 more contacts with smaller peak forces, of which" in told
