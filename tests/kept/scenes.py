@@ -15,24 +15,6 @@ SCENARIO = text_of("kept/scenario.toml")
 
 CAD = text_of("kept/with_cad.toml")
 
-ROUTINE = """
-from pathlib import Path
-
-Path(__file__).with_name("executed").touch()
-
-
-def find(pose_i, pose_j):
-    return [], [], []
-
-
-def torque(t, q, v, contacts):
-    return [0.0] * len(v)
-
-
-def figure(result, scene):
-    return 1.0
-"""
-
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 
 
@@ -54,7 +36,7 @@ def write(home: Path) -> Path:
     plate = "v 0.2 -0.1 0\nv 0.4 -0.1 0\nv 0.4 0.1 0\nv 0.2 0.1 0\nf 1 2 3 4\n"
     (home / "plate.obj").write_text(plate)
     (home / "law.csv").write_text("depth,force\n0,0\n1e-3,10\n")
-    (home / "routine.py").write_text(ROUTINE)
+    shutil.copy(DATA / "kept" / "routine.py", home)
     (home / "all.toml").write_text(SCENARIO + CAD)
     return home / "all.toml"
 
