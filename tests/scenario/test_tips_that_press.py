@@ -125,9 +125,8 @@ def test_a_disc_touches_with_its_rim_and_turns(draft) -> None:
 
 
 THIN = ".02 .02 .2", "0 0 -.1"
-LEG = (
-    link("base") + limb("thigh", "base", "0 0 1", *THIN) + limb("shank", "thigh", "0 0 -.2", *THIN)
-)
+LEG = link("base") + limb("thigh", "base", "0 0 1", *THIN)
+LEG += limb("shank", "thigh", "0 0 -.2", *THIN)
 TURNING = link("palm", ".05 .1 .05") + limb("finger", "palm", "0 0 .1", axis=".4 .9 .2")
 STEEP = link("body", ".1 .1 .1") + limb("hip", "body", "0 0 0", axis="0 0 1")
 STEEP += limb("foot", "hip", ".2 0 0", "", "", ball(".08", ".5 0 0"), limits=(0.52, 1.22))
@@ -179,9 +178,8 @@ def test_a_leg_that_starts_at_a_limit_of_its_knee_bends_it(draft_of) -> None:
 
 def test_a_joint_that_moves_nothing_is_held(draft_of) -> None:
     body = ".02 .02 .3", "0 0 .15"
-    parts = (
-        link("base") + limb("arm", "base", "0 0 1", *body) + limb("fore", "arm", "0 0 .3", *body)
-    )
+    parts = link("base") + limb("arm", "base", "0 0 1", *body)
+    parts += limb("fore", "arm", "0 0 .3", *body)
     parts += urdf.link("flange") + urdf.link("tool0")
     parts += urdf.joint("c", "revolute", "fore", "flange", at="0 0 .3", axis="0 0 1")
     parts += urdf.joint("d", "fixed", "flange", "tool0", at="0 0 .02")
@@ -198,9 +196,8 @@ def test_couplings_that_no_model_has_leave_their_joints_free(draft) -> None:
 
 def test_a_ball_between_walls_is_carried_out_of_them(draft, draft_of, tmp_path: Path) -> None:
     """The ball is 100 mm deep between plates, on a joint that moves it by 20 mm."""
-    plates = [
-        shape("collision", '<box size=".12 .01 .2"/>', at) for at in ("0 .06 .1", "0 -.06 .1")
-    ]
+    wall = '<box size=".12 .01 .2"/>'
+    plates = [shape("collision", wall, f"0 {y} .1") for y in (0.06, -0.06)]
     out = link("base") + limb("upper", "base", "0 0 .4", ".02 .02 .3", "0 0 .15")
     out += limb("cup", "upper", "0 0 .3", "", "", *plates)
     on_rail = {"kind": "prismatic", "axis": "0 0 1", "limits": (-0.02, 0.02)}
