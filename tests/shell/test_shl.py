@@ -86,12 +86,6 @@ def test_polygons_may_have_many_corners(write):
     assert Shell.from_file(write(lines)).health.elements == 13
 
 
-def test_a_wrong_corner_count_shows_as_a_hole(write):
-    polygons = [*INWARD[:5], "3 " + " ".join(INWARD[5].split()[2:])]
-    health = Shell.from_file(write(version_1(polygons=polygons))).health
-    expect(health, "wrong number of corners", ok=False, boundary_edges=3)
-
-
 @pytest.mark.parametrize(
     ("options", "size", "word"),
     [

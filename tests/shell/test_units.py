@@ -31,9 +31,8 @@ def test_default_stiffness_of_adams_is_not_1e8():
 def test_the_force_does_not_depend_on_the_unit(system, exponent, depth):
     length, force = units.ADAMS_UNITS[system]
     stiffness = units.adams_stiffness_to_si(3.0, exponent, system)
-    assert stiffness * (depth * length) ** exponent == pytest.approx(
-        force * 3.0 * depth**exponent, rel=1e-12
-    )
+    expected = pytest.approx(force * 3.0 * depth**exponent, rel=1e-12)
+    assert stiffness * (depth * length) ** exponent == expected
 
 
 def test_size_warning():
