@@ -218,10 +218,9 @@ def tables(rows: Sequence[Row]) -> list[Measured]:
     count = Counter(row.came_to for row in rows)
     loaded, times = len(rows) - count["not loaded"], [row.seconds for row in drafts]
     text = f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
-    text += (
-        f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(one.options) for one in rows)} "
-    )
-    text += "with options that refusals named."
+    with_options = sum(bool(one.options) for one in rows)
+    text += f"check-robot ({count['right'] / len(rows):.0%}), {with_options} with options that "
+    text += "refusals named."
     if drafts:
         text += f" Of {len(drafts)} scenarios that `new` was asked for it wrote "
         text += f"{sum(not row.new for row in drafts)}; seconds of the processor: median "

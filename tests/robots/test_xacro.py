@@ -169,28 +169,7 @@ def test_a_xacro_file_without_a_joint_that_moves_lists_its_arguments(tmp_path):
         assert robots.load_file(file).model.nv == 0
 
 
-CALL = '<xacro:include filename="$(find nix)/a.xacro"/><xacro:arm/><link name="table"/>'
-ENDLESS = "<xacro:macro name='m'><xacro:m/></xacro:macro><xacro:m/>"
-LARGE = "<xacro:property name='a' value='${sorted(range(10**9))}'/><link name='${a}'/>"
-
-
-@pytest.mark.parametrize(
-    ("inside", "words"),
-    [
-        ("${nix}", "xacro cannot expand it: .*nix"),
-        (CALL, "no package 'nix' in .*--package-dir"),
-        (
-            '<xacro:include filename="b.xacro"/>',
-            r"expand it: No such file or directory: \S*b\.xacro$",
-        ),
-        ("$(nix)", r"expand it: Unknown substitution command \[nix\]\. Valid [^.]*$"),
-        ("$(eval nix + 1)", "not a xacro file that can be read: .* it: name 'nix' is not defined$"),
-        ("<link name='a'>", "xacro cannot expand it"),
-        ("<xacro:macro name='m'/><xacro:m s='1'/>", 'Invalid parameter "s": .* another version'),
-        (ENDLESS, "nested too deeply"),
-        (LARGE, "more than 1 GB of memory"),
-    ],
-)
+@pytest.mark.parametrize(("inside", "words"), EXPRESSIONS["unreadable"].items())
 def test_what_xacro_cannot_expand_is_said(tmp_path, inside, words):
     with pytest.raises(robots.RobotError, match=words):
         robots.load_file(xacro(tmp_path, inside))
