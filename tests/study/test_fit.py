@@ -18,6 +18,7 @@ from sphshell_pin.study.fit.report import patterned
 from sphshell_pin.study.fit.search import covariance_of
 from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
+from tests.tables import cases_of
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"
@@ -28,9 +29,8 @@ FORCE = "pairs.tip.normal_force"
 def columns_of(path, t, names, changes=None):
     """Run the scenario; return quantities at the times."""
     built = build(path, changes)
-    result = built.simulation.run(
-        built.q0, built.v0, float(t[-1]), built.controller, record_dt=row_step(t)
-    )
+    start = built.q0, built.v0, float(t[-1]), built.controller
+    result = built.simulation.run(*start, record_dt=row_step(t))
     known = quantities_of(result, built.scene, t, names)
     return {f"{name} [{unit}]": values for name, (unit, values) in known.items()}
 
@@ -85,9 +85,8 @@ def test_the_noise_of_each_column_is_its_own(bounce):
         for name, unit in ((HEIGHT, "m"), (SPEED, "m/s"))
     }
     one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
-    half = stats.t.ppf(0.975, 81) / math.sqrt(
-        sum(np.sum((slopes[name] / noise[name]) ** 2) for name in slopes)
-    )
+    information = sum(np.sum((slopes[name] / noise[name]) ** 2) for name in slopes)
+    half = stats.t.ppf(0.975, 81) / math.sqrt(information)
     assert one.high - one.value == pytest.approx(half, rel=0.25)
 
 
@@ -95,10 +94,8 @@ def test_exact_data_give_back_the_values(bounce):
     t = np.linspace(0.0, 0.12, 301)
     data = {"t [s]": t, **columns_of(bounce, t, [FORCE, "pairs.tip.force_x"])}
     start = {STIFFNESS: 7e4, DISSIPATION: 0.4, FRICTION: 0.15}
-    counts = []
-    found = sp.fit(
-        bounce, data, list(TRUTH), changes=start, progress=lambda runs, misfit: counts.append(runs)
-    )
+    more, counts = {"changes": start, "progress": lambda runs, _: counts.append(runs)}, []
+    found = sp.fit(bounce, data, list(TRUTH), **more)
     assert found.converged
     assert list(found.values.values()) == pytest.approx(list(TRUTH.values()), rel=1e-4)
     assert counts == list(range(1, found.runs + 1))
@@ -176,11 +173,10 @@ def test_what_no_column_feels_is_said(bounce):
 
 def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
     """Hertz's law has both moduli in 1/E* = (1 - nu^2) (1 / E1 + 1 / E2) alone."""
+    stated = '{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }'
     law = '{ type = "hertz", young = 1e6, poisson = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
     path = tmp_path / "two.toml"
-    path.write_text(
-        SCENARIO.replace('{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }', law)
-    )
+    path.write_text(SCENARIO.replace(stated, law))
     data = measured(path, np.linspace(0.0, 0.1, 101), [FORCE], 0.01)
     keys = ["contact.tip.law.young", "contact.tip.law.young_2"]
     found = sp.fit(path, data, keys)
@@ -244,13 +240,9 @@ def test_keys_with_one_value(bounce):
 
 def test_a_sensor_is_read_as_it_logs(bounce, tmp_path):
     """Its readings are those of the file sensors.csv; its noise is that of the data alone."""
-    text = SCENARIO.replace(
-        "[run]",
-        '[[sensor]]\ntype = "force-torque"\nname = "wrist"\nframe = "ball"\nrate = 2000.0\n'
-        "delay = 0.001\nforce_noise = 0.3\n\n[run]",
-    )
+    sensor = '[[sensor]]\ntype = "force-torque"\nname = "wrist"\nframe = "ball"\nrate = 2000.0\n'
     path = tmp_path / "sensed.toml"
-    path.write_text(text)
+    path.write_text(f"{SCENARIO}\n{sensor}delay = 0.001\nforce_noise = 0.3\n")
     built = build(path)
     result = built.simulation.run(built.q0, built.v0, 0.1, record_dt=1e-3)
     data = result.sensor_columns()
@@ -334,21 +326,7 @@ def test_rows_lie_at_the_times_of_the_data(t, step):
     assert row_step(np.array(t)) == pytest.approx(step, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("wanted", "said"),
-    [
-        ([], "parameters"),
-        (["contact.tip.law.stifness"], "did you mean 'stiffness'"),
-        (["run.rtol"], "no property of what was measured"),
-        (["contact.tip.law.type"], "is not a number"),
-        (["robot.ball.start.root_joint.0"], "must not start at 0"),
-        ([STIFFNESS, "contact.law.stiffness"], "given twice"),
-        ({STIFFNESS: (1.0, 2.0)}, "must start within its range"),
-        ({STIFFNESS: (2.0, 1.0)}, "must be a range"),
-        ({STIFFNESS: (-1.0, 1e9)}, "must be positive"),
-        ([f"{STIFFNESS}+{DISSIPATION}"], "must have one unit"),
-    ],
-)
+@pytest.mark.parametrize(("wanted", "said"), cases_of("wrong_fits")["parameters"])
 def test_a_wrong_parameter_gets_a_sentence(bounce, wanted, said):
     data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
     with pytest.raises((ScenarioError, InvalidParameter), match=said):
