@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mjcf_compile import silent
+from tests.tables import cases_of
 from tests.texts import text_of
 
 mujoco = pytest.importorskip("mujoco")
@@ -206,27 +207,11 @@ def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality):
         assert robots.load_file(path).model.nv == 3
 
 
-@pytest.mark.parametrize(
-    ("inside", "head", "words"),
-    [
-        ("<composite/>", "", "<composite> is not supported"),
-        (f"<replicate count='{10**9}'><geom size='1'/></replicate>", "", "has 1000000000 links"),
-        (f"{ARM}<geom size='1'><plugin plugin='p'/></geom>", "", "<plugin> is not supported"),
-        (ARM, "<compiler coordinate='global'/>", "coordinate"),
-        (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
-        ("<body><joint class='x'/></body>", "", "unknown default class name 'x'"),
-        ("<body><joint type='screw'/></body>", "", "invalid keyword: 'screw'"),
-        ("<geom size='1'/>", "", "has no <body>"),
-        ("<body><joint/><geom size='a'/></body>", "", "."),
-        ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
-        ("<body pos='0 nan 0'><joint/><geom size='1'/></body>", "", "not finite"),
-        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "more than 6 dofs in body 'b'"),
-    ],
-)
+@pytest.mark.parametrize(("inside", "head", "words"), cases_of("wrong_robots")["mjcf"])
 def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside, head, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(robots.RobotError, match=rf"not an MJCF that can be read: .*{words}"):
-        robots.load_file(written(tmp_path, inside, head))
+        robots.load_file(written(tmp_path, inside.replace("ARM", ARM), head))
     assert {one.name for one in tmp_path.iterdir()} == {"r.xml"}  # no log of MuJoCo's
 
 
