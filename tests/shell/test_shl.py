@@ -86,19 +86,7 @@ def test_polygons_may_have_many_corners(write):
     assert Shell.from_file(write(lines)).health.elements == 13
 
 
-@pytest.mark.parametrize(
-    ("options", "size", "word"),
-    [
-        ({}, 0.0254, "applied"),
-        ({"scale": "apply"}, 0.0254, "applied"),
-        ({"scale": "ignore"}, 1.0, "ignored"),
-        ({"scale": 2.0}, 2.0, "in place of"),
-        ({"unit": "mm"}, 1e-3, "ignored"),
-        ({"unit": "mm", "scale": "apply"}, 0.0254e-3, "applied"),
-        ({"unit": "mm", "scale": 3}, 3e-3, "in place of"),
-        ({"unit": "in", "scale": "ignore"}, 0.0254, "ignored"),
-    ],
-)
+@pytest.mark.parametrize(("options", "size", "word"), cases_of("shell_files")["scales"])
 def test_scale(write, options, size, word):
     shell = Shell.from_file(write(version_1("0.025400")), **options)
     assert shell.size == pytest.approx(size * np.sqrt(3.0))
