@@ -26,10 +26,8 @@ def model_of(xml: str, *rooms: dict[str, int]):
 
 def sliding(option: str) -> str:
     """A ball that does not turn."""
-    return ball(0.02, 0.1, options=option).replace(
-        "<freejoint/>",
-        "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1")),
-    )
+    slides = "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
+    return ball(0.02, 0.1, options=option).replace("<freejoint/>", slides)
 
 
 def plate(half: float = 1.0) -> sp.Shell:

@@ -143,11 +143,8 @@ def test_events_and_readings_of_sensors_when_they_arrived(finger):
 
 def poses(read, row):
     """Where every frame is in the world, from /tf and /tf_static alone."""
-    stated = {
-        one.child_frame_id: (one.header.frame_id, one.transform)
-        for message in (read.topics["/tf_static"][0], read.topics["/tf"][row])
-        for one in message.transforms
-    }
+    told = (*read.topics["/tf_static"][0].transforms, *read.topics["/tf"][row].transforms)
+    stated = {one.child_frame_id: (one.header.frame_id, one.transform) for one in told}
 
     def pose(name):
         if name == "universe":

@@ -34,9 +34,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with np.load(results) as file:
         arrays = dict(file)
     robots = json.loads(str(arrays["header"]))["origin"]["kept"]["robots"]
-    meshes = {
-        Path(n).suffix: digest for one in robots if one for n, digest in one["meshes"].items()
-    }
+    listed = [item for one in robots if one for item in one["meshes"].items()]
+    meshes = {Path(name).suffix: digest for name, digest in listed}
     assert {*meshes} == {*FORMATS}
     for suffix, digest in meshes.items():
         content = mesh_corpus(suffix)[0].replace(b"/dev/zero", pipe)
