@@ -99,6 +99,14 @@ def pose_of(model: pin.Model, q: Vector, frame: str) -> pin.SE3:
     return data.oMf[model.getFrameId(frame)]
 
 
+def jacobian_of(model: pin.Model, q: Vector, frame: str, offset=(0, 0, 0)) -> Vector:  # type: ignore[no-untyped-def]
+    """Jacobian (6, nv) of a frame at q (nq,), or of a point in it, in the axes of the world."""
+    data, index = model.createData(), model.getFrameId(frame)
+    found = pin.computeFrameJacobian(model, data, q, index, pin.LOCAL_WORLD_ALIGNED)
+    arm = data.oMf[index].rotation @ np.array(offset, dtype=float)
+    return np.vstack([found[:3] - pin.skew(arm) @ found[3:], found[3:]])
+
+
 def plate(size: float = 1.0, count: int = 8, side: str = "both") -> Shell:
     """Flat plate z = 0."""
     return Shell(*meshes.random_plate(count, seed=count, size=size, slivers=False), side=side)

@@ -222,9 +222,8 @@ def sections(cases: Sequence[Case]) -> list[Measured]:
     arms = [case for case in cases if case.word in ("slides", "presses")]
     times = [case.seconds for case in cases]
     floor = sum(abs(case.raised) < 1e-3 for case in arms)
-    text = (
-        f"{len(cases)} cases: {len(cases) - count['refused']} written, of which {count['fails']} "
-    )
+    written = len(cases) - count["refused"]
+    text = f"{len(cases)} cases: {written} written, of which {count['fails']} "
     text += f"fail; {count['refused']} refused. Of {len(arms)} that press, {count['slides']} slide "
     text += f"and in {floor} the part is on the floor. Seconds for an answer: median "
     text += f"{np.median(times):.1f}, most {max(times):.1f}."

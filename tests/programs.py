@@ -23,8 +23,6 @@ def python(program, *arguments, check=False, timeout=120.0, **more):
 def module_of(file: Path) -> ModuleType:
     """Return the module of a file."""
     spec = importlib.util.spec_from_file_location(file.stem, file)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -11,29 +11,16 @@ A module of hard cases:
 
 import importlib
 from collections.abc import Callable, Sequence
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
-
-class Known(Protocol):
-    """What a register holds: a function `run`, which may be slow."""
-
-    @property
-    def run(self) -> Callable[[], Any]:
-        """Runs and judges."""
-
-    @property
-    def slow(self) -> bool:
-        """Whether it takes more than a few seconds."""
-
-
-K = TypeVar("K", bound=Known)
-F = TypeVar("F", bound=Callable[..., object])
+K = TypeVar("K")
 
 
 class Register(Generic[K]):
     """The cases of some modules of a package, by their names, in the order of the modules.
 
-    `make` makes one of its name, its function and what else the decorator `case` is given.
+    `make` makes one of its name, its function and what else the decorator `case` is given; it has
+    the function as `run`, and says by `slow` whether that takes more than a few seconds.
     """
 
     def __init__(self, package: str, modules: Sequence[str], make: Callable[..., K]) -> None:
@@ -41,10 +28,10 @@ class Register(Generic[K]):
         self._make = make
         self._known: dict[str, K] = {}
 
-    def case(self, name: str, **facts: object) -> Callable[[F], F]:
+    def case(self, name: str, **facts: object):
         """Decorate the function that runs a case; ValueError where the name is taken."""
 
-        def register(run: F) -> F:
+        def register(run):
             if name in self._known:
                 raise ValueError(f"two cases are called {name!r}")
             self._known[name] = self._make(name, run, **facts)
@@ -59,9 +46,7 @@ class Register(Generic[K]):
         """
         for name in self.modules:
             importlib.import_module(name)
-        chosen = [
-            known
-            for name, known in self._known.items()
-            if not (quick and known.slow) and (not only or only in f"{known.run.__module__} {name}")
-        ]
+        words = {name: f"{known.run.__module__} {name}" for name, known in self._known.items()}
+        chosen = [known for name, known in self._known.items() if (only or "") in words[name]]
+        chosen = [known for known in chosen if not (quick and known.slow)]
         return sorted(chosen, key=lambda known: self.modules.index(known.run.__module__))

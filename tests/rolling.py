@@ -143,9 +143,8 @@ def in_cylinder(ball, shell, radius, orbit, *, stiffness, mu=1.5, periods=3):
     out, b = radius - ball.radius + depth, ball.beta(depth)
     expected = math.sqrt(b / (1 + b))
     swing = GRAVITY / (b * orbit**2)
-    q0, v0 = state(
-        [out, 0.0, swing], [0.0, out * orbit, 0.0], [0.0, 0.0, -out * orbit / (ball.radius - depth)]
-    )
+    spin = [0.0, 0.0, -out * orbit / (ball.radius - depth)]
+    q0, v0 = state([out, 0.0, swing], [0.0, out * orbit, 0.0], spin)
     scene = ball.scene(shell, ball.spring(stiffness), ball.bristle(mu, stiffness))
     duration = (periods + 0.4) * 2 * math.pi / (orbit * expected)
     result = Simulation(scene, PRECISE).run(q0, v0, duration, record_dt=1e-3)

@@ -53,9 +53,8 @@ class Case:
     def run(self, scene=None, q0=None, v0=None, names=None):
         asked = self.options if names is None else {**self.options, "sensitivities": names}
         start = self.q0 if q0 is None else q0, self.v0 if v0 is None else v0
-        return sp.Simulation(scene or self.scene, self.integrator).run(
-            *start, self.duration, **asked
-        )
+        simulation = sp.Simulation(scene or self.scene, self.integrator)
+        return simulation.run(*start, self.duration, **asked)
 
     def columns(self, names: Sequence[str]) -> list[str]:
         """The names of the columns."""

@@ -84,10 +84,8 @@ def test_a_solid_held_from_both_sides_has_two_pictures():
 
 def test_a_fine_mesh_is_colored_as_wide_as_a_line(monkeypatch):
     monkeypatch.setattr("sphshell_pin.plot.on_shell.MOST_PAINTED", 5_000)
-    rows = [
-        {"row": k % 4, "element": 151 * k, "point_world": [-0.5 + k / 150, -0.5 + k / 150, 0]}
-        for k in range(150)
-    ]
+    way = np.linspace(-0.5, 0.5, 150, endpoint=False)
+    rows = [{"row": k % 4, "element": 151 * k, "point_world": [x, x, 0]} for k, x in enumerate(way)]
     ground, strip = plot_contact_map(*on(grid(150), rows)).axes[0].collections
     assert len(strip._faces) == 150
     assert strip.get_linewidth()[0] > 2.0
@@ -125,10 +123,8 @@ def test_what_passed_between_the_rows_is_reported(figures, said):
 
 
 def test_of_a_large_shell_the_part_that_was_touched_is_shown():
-    rows = [
-        {"row": k, "element": 820 + k, "point_world": [0.0125, 0.0125 + 0.025 * k, 0]}
-        for k in range(3)
-    ]
+    places = [[0.0125, 0.0125 + 0.025 * k, 0] for k in range(3)]
+    rows = [{"row": k, "element": 820 + k, "point_world": at} for k, at in enumerate(places)]
     axis = plot_contact_map(*on(grid(40), rows)).axes[0]
     assert axis.get_xlabel() == "x of the shell [mm]"
     assert 3 <= len(painted(axis)[0]) < 400

@@ -4,6 +4,7 @@ Each is made a notebook and executed; what it comes to is checked in its own ker
 `check_NAME` of this module.
 """
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -12,31 +13,13 @@ import pytest
 
 from tests.programs import module_of
 from tests.studies import mostly_studies
+from tests.texts import text_of
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "docs" / "examples"
 NAMES = sorted(path.stem for path in EXAMPLES.glob("*.py"))
-FILES = {
-    "01_ball_on_a_surface": "overview.png contact_map.png ball.html",
-    "02_own_loop": "own_loop.png",
-    "03_parameter_study": "friction.png stiffness.png",
-    "04_taxels_on_a_crease": "taxels.npz taxels.png",
-    "05_circle_with_5_newtons": "circle.png",
-    "06_fit_measured_rebounds": "alumina.urdf rebound.toml rebound.fitted.toml fit.png",
-    "07_peg_in_mujoco": "peg.png",
-    "08_gripper_with_loops": "gripper.png",
-    "09_wear_of_a_polished_part": "wear.png",
-    "10_link_of_spheres": "spheres.png",
-}
-# Objects that the last line of a cell shows.
-SHOWN = {
-    "01_ball_on_a_surface": ["Scene", "Result"],
-    "02_own_loop": ["Result"],
-    "04_taxels_on_a_crease": ["Result"],
-    "06_fit_measured_rebounds": ["Fit of "],
-}
+TOLD = tomllib.loads(text_of("examples.toml"))
 LONG = [f"0{k}_" for k in (3, 5, 6, 9)]
-NEEDS = {"05_circle_with_5_newtons": "crocoddyl", "07_peg_in_mujoco": "mujoco"}
 
 
 @pytest.fixture(scope="module")
@@ -49,14 +32,14 @@ def notebooks():
 
 @pytest.mark.parametrize("name", mostly_studies(NAMES, lambda name: name[:3] not in LONG))
 def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
-    pytest.importorskip(NEEDS.get(name, "numpy"))
+    pytest.importorskip(TOLD[name].get("needs", "numpy"))
     notebook = notebooks.notebook_of(EXAMPLES / f"{name}.py")
     check = f"check_{name[3:]}"
     cell = f"import sys\nsys.path.insert(0, {str(ROOT)!r})\n"
     cell += f"from tests.test_examples import {check}\n{check}(globals())"
     notebook.cells.append(type(notebook.cells[-1])(notebook.cells[-1], source=cell, id="check"))
     done = notebooks.execute(notebook, tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == set(FILES[name].split())
+    assert {path.name for path in tmp_path.iterdir()} == set(TOLD[name]["files"])
     for path in tmp_path.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
     outputs = [output for one in done.cells for output in one.get("outputs", [])]
@@ -64,7 +47,7 @@ def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
     assert any("image/png" in one.get("data", {}) for one in outputs)
     texts = [one.get("data", {}).get("text/plain", "") for one in outputs]
     assert " at 0x" not in " ".join(texts)
-    for title in SHOWN.get(name, []):
+    for title in TOLD[name].get("shows", []):
         assert any(text.startswith(f"<{title}") for text in texts), title
     done.cells.pop()
     text, files = notebooks.page_of(done, name)
@@ -74,7 +57,7 @@ def test_an_example_comes_to_what_it_should(notebooks, name, tmp_path):
 
 
 def test_every_example_is_tested():
-    assert set(FILES) == set(NAMES)
+    assert set(TOLD) == set(NAMES)
 
 
 def check_link_of_spheres(names):

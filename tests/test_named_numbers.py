@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import tomllib
 
 import pytest
 
@@ -15,38 +16,14 @@ from sphshell_pin.study.fit.parameters import free_parameters
 from sphshell_pin.study.sweep.plan import plan_sweep
 from tests import models
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 
 LAW = next(line for line in DROP.splitlines() if line.startswith("law"))
-HERTZ = {"young": 1e9, "poisson": 0.3, "young_2": 2e9, "poisson_2": 0.4}
-SLIDING = {"mu_static": 0.4, "mu_dynamic": 0.2}
-SAMPLED = {"name": "one", "rate": 500.0, "delay": 1e-3}
-FORCE_TORQUE = {"frame": "root_joint", "cutoff": 50.0, "seed": 1, "force_range": 9.0}
-FORCE_TORQUE |= {"torque_range": 8.0, "force_noise": 0.1, "torque_noise": 0.2}
-ROLLING = {"damping_time": 1e-3, "rolling": 0.1, "rolling_speed": 1e-2, "v_stribeck": 0.02}
-BRISTLES = {"stiffness": 1e4, "damping": 3.0, "v_stribeck": 0.02}
-IMPACT = {"stiffness": 1e6, "exponent": 1.5, "damping": 2.0, "full_damping_depth": 2e-4}
-STATED = {
-    "law": [
-        {"type": "impact", **IMPACT},
-        {"type": "foundation", "modulus": 1e7, "thickness": 1e-3, "dissipation": 0.1},
-        {"type": "hunt-crossley", "stiffness": 1e6, "exponent": 1.5, "dissipation": 0.2},
-        {"type": "hertz", **HERTZ, "restitution": 0.5, "speed": 1.0},
-        {"type": "hertz", **HERTZ, "loss_tangent": 0.1, "frequency": 10.0},
-    ],
-    "friction": [
-        {"type": "coulomb", **SLIDING, "v_static": 0.1, "v_dynamic": 0.2},
-        {"type": "bristle", **SLIDING, **BRISTLES},
-        {"type": "mindlin", **SLIDING, **HERTZ, **ROLLING},
-    ],
-    "sensor": [
-        {"type": "force-torque", **SAMPLED, **FORCE_TORQUE},
-        {"type": "contact-switch", **SAMPLED, "contact": "ball-plate"}
-        | {"threshold": 0.4, "release": 0.2},
-    ],
-}
+STATED = tomllib.loads(text_of("scenarios/numbers.toml"))
+HERTZ = STATED["law"][3]
 KEYS = [
     pytest.param(part, table, name, id=f"{part}-{table.get('type')}-{name}")
-    for part, tables in {**STATED, "sphere": [{"radius": 0.012, "offset.2": 1e-4}]}.items()
+    for part, tables in STATED.items()
     for table in tables
     for name, value in table.items()
     if not isinstance(value, str)
@@ -144,7 +121,7 @@ def test_a_single_number_has_no_places() -> None:
     [("law.yuong", "young"), ("law.yuong_2", "young_2"), ("sphere.radios", "radius")],
 )
 def test_the_nearest_name_of_the_same_body_is_suggested(wrong, hint, tmp_path):
-    path = write(tmp_path, drop("law", {"type": "hertz", **HERTZ}))
+    path = write(tmp_path, drop("law", HERTZ))
     built, key = build(path), f"contact.ball-plate.{wrong}"
     said = rf"did you mean '(ball-plate.)?({wrong.split('.')[0]}\.)?{hint}'"
     with pytest.raises(ScenarioError, match=said):

@@ -16,6 +16,7 @@ import pytest
 
 import sphshell_pin
 from tests.programs import module_of
+from tests.texts import text_of
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -157,25 +158,11 @@ def faults_of(tmp_path):
 
 
 CORE = "sphshell_pin/_core.cpython-311-x86_64-linux-gnu.so"
-FILES = """sphshell_pin/_built_against.py sphshell_pin/_core.pyi sphshell_pin/py.typed
-    sphshell_pin/view/recording_page/page.html sphshell_pin/view/live/page/page.js
-    sphshell_pin/robots/urdf/ball.urdf sphshell_pin/robots/meshes/gear_20.stl
-    sphshell_pin/scenario/drafting/draft.template sphshell_pin/scenarios/sphere_on_shell.toml
-    sphshell_pin/scenarios/surfaces/bladex_upper.LICENSE.txt pytest_sphshell_pin/__init__.py
-    sphshell_pin/no_display/libGL.so.1 sphshell_pin-1.0.dist-info/METADATA"""
-GOOD = {CORE: b"\0$ORIGIN/../cmeel.prefix/lib\0", **dict.fromkeys(FILES.split(), b"")}
-BAD = [
-    ("sphshell_pin.libs/libboost_python311-1.so.1.90.0", b"", "outside"),
-    ("sphshell_pin/libX11.so.6", b"", "libX11.so.6 does not belong"),
-    ("sphshell_pin/cpp/shell/bvh.cpp", b"", "bvh.cpp does not belong"),
-    ("sphshell_pin/tests/test_a.py", b"", "does not belong"),
-    ("sphshell_pin/benchmarks/growth.py", b"", "does not belong"),
-    (CORE, b"$ORIGIN", "cmeel.prefix"),
-    ("sphshell_pin/scenarios/sphere_on_shell.toml", None, "no sphshell_pin/scen"),
-    ("pytest_sphshell_pin/__init__.py", None, "no pytest_sphshell_pin"),
-    ("sphshell_pin/_built_against.py", None, "no sphshell_pin/_built_against.py"),
-    ("sphshell_pin/py.typed", None, "no sphshell_pin/py.typed"),
-]
+WHEEL = tomllib.loads(text_of("wheel.toml"))
+GOOD = {CORE: b"\0$ORIGIN/../cmeel.prefix/lib\0", **dict.fromkeys(WHEEL["files"], b"")}
+BAD = [(CORE, b"$ORIGIN", "cmeel.prefix")]
+BAD += [(file, b"", said) for file, said in WHEEL["added"]]
+BAD += [(file, None, said) for file, said in WHEEL["left_out"]]
 
 
 def test_a_good_wheel_passes_its_check(faults_of):
@@ -195,9 +182,8 @@ def test_a_wheel_is_refused_with(file, data, said, faults_of):
 def test_symbols_must_be_those_of_the_tag(tag, newer, faults_of):
     names = "GLIBC_2.2.5 GLIBC_2.28 GLIBC_2.35 GLIBCXX_3.4.24 GLIBCXX_3.4.30 CXXABI_1.3.9"
     symbols = "".join(f"\0{name}" for name in names.split()) + "\0"
-    faults = faults_of(
-        {CORE: GOOD[CORE] + symbols.encode()}, f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
-    )
+    wheel = f"sphshell_pin-1.0-cp311-cp311-{tag}.whl"
+    faults = faults_of({CORE: GOOD[CORE] + symbols.encode()}, wheel)
     assert faults == ([f"{CORE} needs {newer}, which {tag[:14]} does not have"] if newer else [])
 
 

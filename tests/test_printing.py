@@ -9,6 +9,7 @@ import shutil
 import signal
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -22,26 +23,10 @@ from sphshell_pin.study import report
 from sphshell_pin.study.report.contents import Finding, Section
 from sphshell_pin.study.report.making import Part
 from tests.scenario.files import DROP, write
+from tests.texts import DATA, text_of
 
-MESH = Path(__file__).parent / "data" / "corpus" / "trimesh_joined_tetrahedra.obj"
-# In a folder of its own with drop.toml, drop.csv and results; é is in no ASCII.
-WORDS = {
-    "run": "drop.toml --no-recording --no-figures --out é",
-    "view": "results --no-open",
-    "render": "results --out é.png",
-    "export": "results --to csv --out é",
-    "explain": "drop.toml",
-    "check": f"{MESH} --unit m",
-    "convert": f"{MESH} é.stl --unit-in m --unit-out mm",
-    "check-robot": "three_link_finger",
-    "new": "--robot three_link_finger --out é.toml",
-    "sweep": "drop.toml --vary contact.ball-plate.law.stiffness=1e5:1e6:2 --workers 0 "
-    "--no-pictures --out é.parquet",
-    "fit": "drop.csv drop.toml --param gravity.2 --out é",
-    "compare": "results results --no-picture --out é",
-    "report": "--out é",
-    "list": "",
-}
+MESH = DATA / "corpus" / "trimesh_joined_tetrahedra.obj"
+WORDS = tomllib.loads(text_of("commands.toml").replace("MESH", str(MESH)))
 
 
 def heard() -> None:

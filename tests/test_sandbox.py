@@ -6,12 +6,14 @@ import platform
 import re
 import socket
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from sphshell_pin.base import sandbox
 from sphshell_pin.base.limits import child_command
+from tests.texts import text_of
 
 CHILD = """
 import ctypes, json, os, resource, signal, socket, threading
@@ -34,46 +36,8 @@ def serve(source, target):
             answer[name] = type(error).__name__
     os.write(target, json.dumps(answer).encode())
 """
-REFUSED = {
-    "write": "open(old, 'w')",
-    "append": "open(old, 'a')",
-    "write without a name": "os.open(folder, os.O_TMPFILE | os.O_RDWR)",
-    "truncate": "os.truncate(old, 0)",
-    "unlink": "os.unlink(old)",
-    "rename": "os.rename(old, new)",
-    "link": "os.link(old, new)",
-    "symlink": "os.symlink(old, new)",
-    "mkdir": "os.mkdir(new)",
-    "rmdir": "os.rmdir(empty)",
-    "pipe": "os.mkfifo(new)",
-    "mode": "os.chmod(old, 0)",
-    "times": "os.utime(old, (0, 0))",
-    "attribute": "os.setxattr(old, 'user.a', b'1')",
-    "connect": "socket.create_connection(('127.0.0.1', port))",
-    "datagram": "socket.socket(socket.AF_INET, socket.SOCK_DGRAM)",
-    "local socket": "socket.socket(socket.AF_UNIX)",
-    "pair": "socket.socketpair()",
-    "exec": "os.execv('/bin/sh', ['sh', '-c', 'echo > ' + new])",
-    "exec of memory": "os.memfd_create('a')",
-    "fork": "os.fork()",
-    "command": "[os.system('echo > ' + new)].index(0)",
-    "signal": "os.kill(os.getppid(), 0)",
-    "limits of another": "resource.prlimit(os.getppid(), resource.RLIMIT_CORE, (0, 0))",
-    "trace": "call(101, 16, os.getppid(), 0, 0)",
-    "memory of another": "open(f'/proc/{os.getppid()}/mem', 'r+b')",
-    "ring": "call(425, 8, 0)",
-    "open in another way": "call(437, -100, 0, 0, 0)",
-    "clone3": "call(435, 0, 0)",
-    "owner of a pipe": "call(72, 1, 8, os.getppid())",
-    "the other numbers of x86-64": "call(0x40000000 | 39)",
-}
-ALLOWED = {
-    "read": "open(old).read()",
-    "list": "os.listdir(folder)",
-    "thread": "thread()",
-    "own signal": "os.kill(os.getpid(), 0)",
-    "time": "len(os.times())",
-}
+ATTEMPTS = tomllib.loads(text_of("sandbox/attempts.toml"))
+REFUSED, ALLOWED = ATTEMPTS["refused"], ATTEMPTS["allowed"]
 
 
 def confined() -> bool:

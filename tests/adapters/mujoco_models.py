@@ -1,9 +1,9 @@
 """Models of MuJoCo for the tests of its adapter."""
 
-import numpy as np
 import pytest
 
 import sphshell_pin as sp
+from tests import models
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -26,15 +26,12 @@ def model_of(xml: str, *rooms: dict[str, int]):
 
 def sliding(option: str) -> str:
     """A ball that does not turn."""
-    return ball(0.02, 0.1, options=option).replace(
-        "<freejoint/>",
-        "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1")),
-    )
+    slides = "".join(f'<joint type="slide" axis="{a}"/>' for a in ("1 0 0", "0 1 0", "0 0 1"))
+    return ball(0.02, 0.1, options=option).replace("<freejoint/>", slides)
 
 
-def plate(size: float = 1.0) -> sp.Shell:
-    corners = size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    return sp.Shell(corners, [[0, 1, 2, 3]], name="plate")
+def plate(half: float = 1.0) -> sp.Shell:
+    return models.square(2 * half)
 
 
 def slab(count: int, radius: float = 0.02) -> str:

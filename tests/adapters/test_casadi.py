@@ -8,6 +8,7 @@ import sphshell_pin as sp
 from sphshell_pin.errors import InvalidParameter, NameNotFound
 from tests import models
 from tests.adapters.test_crocoddyl import arm_on_moving_plate, free_ball, with_bristles
+from tests.differences import acceleration
 
 casadi = pytest.importorskip("casadi")
 
@@ -73,10 +74,7 @@ def test_values_are_those_of_the_scene():
     nq, nv = scene.model.nq, scene.model.nv
     q, v, tau = x[:nq], x[nq:], np.linspace(-1.0, 1.0, nv)
     got = flat(ForwardDynamics(scene, q)(np.zeros(nv), v, tau))
-    fext = scene.external_forces(q, v)
-    np.testing.assert_allclose(
-        got, pin.aba(scene.model, scene.model.createData(), q, v, tau, fext), rtol=1e-12
-    )
+    np.testing.assert_allclose(got, acceleration(scene, q, v, tau), rtol=1e-12)
     simulation = sp.Simulation(scene, sp.RungeKutta4(1e-4))
     q_next, v_next = (flat(one) for one in Step(simulation, q)(np.zeros(nv), v, tau))
     run = simulation.run(q, v, 1e-4, lambda t, q, v, contacts: tau)
@@ -100,11 +98,8 @@ def test_a_nonlinear_program_finds_the_torques_that_hold_a_press():
     f = ForwardDynamics(scene)
     q, tau = casadi.MX.sym("q", 2), casadi.MX.sym("tau", 2)
     height = -0.3 * casadi.sin(q[0]) - 0.3 * casadi.sin(q[0] + q[1])
-    problem = {
-        "x": casadi.vertcat(q, tau),
-        "f": casadi.sumsqr(tau),
-        "g": casadi.vertcat(f(q, np.zeros(2), tau), height),
-    }
+    problem = {"x": casadi.vertcat(q, tau), "f": casadi.sumsqr(tau)}
+    problem["g"] = casadi.vertcat(f(q, np.zeros(2), tau), height)
     ipopt = {"print_level": 0, "hessian_approximation": "limited-memory", "tol": 1e-10}
     solver = casadi.nlpsol("press", "ipopt", problem, {"print_time": False, "ipopt": ipopt})
     wanted = [0.0, 0.0, -0.2 + 0.02 - law.depth_at(3.0)]

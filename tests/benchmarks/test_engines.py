@@ -61,9 +61,8 @@ def press_scene():
 def test_the_loop_and_ours_press_alike():
     scene = press_scene()
     loop = PythonLoop().run(scene, {"dt": scene.dt, "loop": PYTHON})
-    short = Ours().run(
-        replace(scene, steps=loop.steps), {"integrator": "SemiImplicitEuler", "dt": scene.dt}
-    )
+    params = {"integrator": "SemiImplicitEuler", "dt": scene.dt}
+    short = Ours().run(replace(scene, steps=loop.steps), params)
     # Flat triangles and one contact against curved elements: alike to the sagitta.
     assert loop.position[-1] == pytest.approx(short.position[-1], abs=1e-4)
 

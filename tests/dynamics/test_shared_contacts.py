@@ -158,7 +158,7 @@ def test_one_corner_has_its_own_depth() -> None:
 
 def test_the_other_end_of_an_edge_begins_to_share_where_the_maximum_says() -> None:
     """With its lead l = L^2 / 2 - R rise and the ridge e: from l = -e on, (l + e) / (L^2 + 2 e)."""
-    shell, length = box(), 0.06
+    shell, length = planes.box(), 0.06
     ridge = 1e-4 * shell.size**2
     scene = scene_of(shell, linear_law(1e4))
     for lead in (-1.5 * ridge, -0.5 * ridge, 0.5 * ridge, 2.0 * ridge):

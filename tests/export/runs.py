@@ -49,15 +49,9 @@ def turntable_run():
     model.addBodyFrame("ball", ball, pin.SE3.Identity(), 0)
     model.addBodyFrame("cap", ball, pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.01])), 0)
     scene = sp.Scene(model)
-    scene.add_contact(
-        sp.Sphere(0.02, "ball"),
-        sp.Shell(*WALL, name="disc"),
-        frame="disc",
-        placement=tilted.inverse(),
-        law=LAW,
-        friction=FRICTION,
-        name="1st ball/disc",
-    )
+    placed = {"frame": "disc", "placement": tilted.inverse(), "friction": FRICTION}
+    disc = sp.Shell(*WALL, name="disc")
+    scene.add_contact(sp.Sphere(0.02, "ball"), disc, law=LAW, name="1st ball/disc", **placed)
     q0 = np.array([1.0, 0.0, 0.05, 0.01, 0.0201, 0.0, 0.0, 0.0, 1.0])
     v0 = np.array([3.0, 0.1, 0.0, 0.0, 0.5, 0.0, 0.0])
     return sp.Simulation(scene, sp.RungeKutta4(1e-4)).run(q0, v0, 0.05, record_dt=1e-3)

@@ -89,9 +89,8 @@ def test_the_numbers_of_rows_are_those_of_the_result(finger):
         np.testing.assert_array_equal(read.numbers(f"/energy/{part}", "data"), values)
     rows = result.row_columns()
     for topic, column in (("normal_force", "normal_force [N]"), ("depth", "depth [m]")):
-        np.testing.assert_array_equal(
-            read.numbers(f"/contacts/tip_wall/{topic}", "data"), rows[f"pairs.tip-wall.{column}"]
-        )
+        sent = read.numbers(f"/contacts/tip_wall/{topic}", "data")
+        np.testing.assert_array_equal(sent, rows[f"pairs.tip-wall.{column}"])
     assert max(rows["pairs.tip-wall.normal_force [N]"]) > 0.1
 
 
@@ -144,11 +143,8 @@ def test_events_and_readings_of_sensors_when_they_arrived(finger):
 
 def poses(read, row):
     """Where every frame is in the world, from /tf and /tf_static alone."""
-    stated = {
-        one.child_frame_id: (one.header.frame_id, one.transform)
-        for message in (read.topics["/tf_static"][0], read.topics["/tf"][row])
-        for one in message.transforms
-    }
+    told = (*read.topics["/tf_static"][0].transforms, *read.topics["/tf"][row].transforms)
+    stated = {one.child_frame_id: (one.header.frame_id, one.transform) for one in told}
 
     def pose(name):
         if name == "universe":

@@ -11,6 +11,7 @@ from sphshell_pin.base.tables import column, csv_text, quantity_of
 from sphshell_pin.dynamics.result.result_columns import coordinates
 from sphshell_pin.errors import MissingExtra, ResultError
 from sphshell_pin.export.tables import tables_of, write_tables
+from tests.tables import cases_of
 
 
 def read(folder, format):
@@ -61,22 +62,6 @@ def test_joints_with_several_numbers_have_numbered_columns(table):
     assert list(table.row_columns())[1 : 1 + len(in_q) + len(in_v)] == [*in_q, *in_v]
 
 
-UNITS = {
-    "RY": ("rad", "rad/s"),
-    "RevoluteUnaligned": ("rad", "rad/s"),
-    "HX": ("rad", "rad/s"),
-    "RUBZ": ("1 1", "rad/s"),
-    "RevoluteUnboundedUnaligned": ("1 1", "rad/s"),
-    "PY": ("m", "m/s"),
-    "PrismaticUnaligned": ("m", "m/s"),
-    "Translation": ("m m m", "m/s m/s m/s"),
-    "Spherical": ("1 1 1 1", "rad/s rad/s rad/s"),
-    "SphericalZYX": ("rad rad rad", "rad/s rad/s rad/s"),
-    "Planar": ("m m 1 1", "m/s m/s rad/s"),
-    "FreeFlyer": ("m m m 1 1 1 1", "m/s m/s m/s rad/s rad/s rad/s"),
-}
-
-
 def test_every_kind_of_joint_has_columns():
     import pinocchio as pin
 
@@ -93,7 +78,7 @@ def test_every_kind_of_joint_has_columns():
     for name, unit in map(quantity_of, (*in_q, *in_v)):
         letter, joint = name.split(".")[:2]
         found.setdefault((letter, joint.removeprefix("JointModel")), []).append(unit)
-    for kind, (q, v) in UNITS.items():
+    for kind, (q, v) in cases_of("joint_units")["units"].items():
         assert (found["q", kind], found["v", kind]) == (q.split(), v.split())
 
 

@@ -136,8 +136,6 @@ def look(repository: Path, out: Path, scenario: str) -> None:
         import mujoco  # noqa: F401
 
     package = importlib.util.find_spec("sphshell_pin")
-    assert package is not None
-    assert package.origin is not None
     code = [Path(sys.prefix), Path(sys.base_prefix), *map(Path, site.getsitepackages())]
     code += [Path(package.origin).parent, Path(__file__).parent]
     code += [repository / one for one in ("robots", "build")]

@@ -15,24 +15,6 @@ SCENARIO = text_of("kept/scenario.toml")
 
 CAD = text_of("kept/with_cad.toml")
 
-ROUTINE = """
-from pathlib import Path
-
-Path(__file__).with_name("executed").touch()
-
-
-def find(pose_i, pose_j):
-    return [], [], []
-
-
-def torque(t, q, v, contacts):
-    return [0.0] * len(v)
-
-
-def figure(result, scene):
-    return 1.0
-"""
-
 HEAD = '<robot name="arm" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 
 
@@ -43,20 +25,18 @@ def write(home: Path) -> Path:
     (home / "arm" / "arm.srdf").write_text(text_of("kept/arm.srdf"))
     # Meshes that name other files, in every format that is kept.
     for suffix in FORMATS:
-        (home / "arm" / f"drawn{suffix}").write_bytes(
-            mesh_corpus(suffix)[0].replace(b"/dev/zero", b"named")
-        )
+        drawn = mesh_corpus(suffix)[0].replace(b"/dev/zero", b"named")
+        (home / "arm" / f"drawn{suffix}").write_bytes(drawn)
     with (home / "arm" / "drawn.obj").open("ab") as file:
         file.write(b"\rmtllib named\nmtllib named\nusemtl a\n")
     (home / "arm" / "named").write_text("newmtl a\nmap_Kd named\n")
     shutil.copy(DATA / "mjcf" / "meshes.xml", home)
     shutil.copytree(DATA / "mjcf" / "assets", home / "assets")
     shutil.copy(shipped_scenarios()["polished_valve"].parent / "surfaces" / "valve_body.step", home)
-    (home / "plate.obj").write_text(
-        "v 0.2 -0.1 0\nv 0.4 -0.1 0\nv 0.4 0.1 0\nv 0.2 0.1 0\nf 1 2 3 4\n"
-    )
+    plate = "v 0.2 -0.1 0\nv 0.4 -0.1 0\nv 0.4 0.1 0\nv 0.2 0.1 0\nf 1 2 3 4\n"
+    (home / "plate.obj").write_text(plate)
     (home / "law.csv").write_text("depth,force\n0,0\n1e-3,10\n")
-    (home / "routine.py").write_text(ROUTINE)
+    shutil.copy(DATA / "kept" / "routine.py", home)
     (home / "all.toml").write_text(SCENARIO + CAD)
     return home / "all.toml"
 

@@ -34,9 +34,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with np.load(results) as file:
         arrays = dict(file)
     robots = json.loads(str(arrays["header"]))["origin"]["kept"]["robots"]
-    meshes = {
-        Path(n).suffix: digest for one in robots if one for n, digest in one["meshes"].items()
-    }
+    listed = [item for one in robots if one for item in one["meshes"].items()]
+    meshes = {Path(name).suffix: digest for name, digest in listed}
     assert {*meshes} == {*FORMATS}
     for suffix, digest in meshes.items():
         content = mesh_corpus(suffix)[0].replace(b"/dev/zero", pipe)
@@ -63,17 +62,11 @@ def seen(home, tmp_path_factory, request):
     else:
         (work / "here" / "run").symlink_to(home / "results")
     out = work / "noticed.json"
-    program = Path(__file__).with_name("looking.py")
-    repository = Path(__file__).parents[2]
+    program, repository = Path(__file__).with_name("looking.py"), Path(__file__).parents[2]
+    command = [sys.executable, program, repository, out, home / "all.toml"]
     try:
-        done = subprocess.run(
-            [sys.executable, program, repository, out, home / "all.toml"],
-            cwd=work / "here",
-            env={**os.environ, "TMPDIR": str(work / "temporary")},
-            capture_output=True,
-            timeout=500,
-            check=False,
-        )
+        more = {"cwd": work / "here", "env": {**os.environ, "TMPDIR": str(work / "temporary")}}
+        done = subprocess.run(command, capture_output=True, timeout=500, check=False, **more)
     finally:
         if request.param == "alone":
             hidden.rename(home)

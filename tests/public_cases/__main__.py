@@ -23,9 +23,7 @@ def listed(page: str) -> list[str]:
 
 def main() -> int:
     """Measure, print, and write; return 1 where a figure is off."""
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.public_cases", description=(__doc__ or "").partition("\n")[0]
-    )
+    parser = argparse.ArgumentParser(prog="python -m tests.public_cases", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="by default all")
     parser.add_argument("--write", action="store_true", help="write docs/cases.md")
     options = parser.parse_args()

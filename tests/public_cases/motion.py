@@ -13,6 +13,7 @@ GRAVITY = 9.81
 HARD, ELASTIC = sp.HuntCrossleyLaw(1e6, 1.5, 0.5), sp.HuntCrossleyLaw(1e6, 1.5, 0.0)
 DEPTH = HARD.depth_at(GRAVITY)  # of a ball of 1 kg at rest
 SQUARE = sp.Shell(*meshes.grid_plate(16, 16, 8.0))
+EULER = sp.SemiImplicitEuler(1e-4)
 
 
 def plate_scene(model: pin.Model, friction: object, law: object = None) -> sp.Scene:
@@ -43,9 +44,7 @@ def ramp(strips: int) -> tuple[float, float]:
     )
     depth = law.depth_at(GRAVITY * np.cos(slope))
     start = -1.5 * along + 0.3 * np.eye(3)[1] + (radius - depth) * normal
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        models.free_q(start), duration=1.0, record_dt=0.01
-    )
+    result = models.run(scene, EULER, models.free_q(start), duration=1.0, record_dt=0.01)
     places = result.q[:, :3]
     acceleration = GRAVITY * np.sin(slope) / (1 + 0.4 * (radius / (radius - depth)) ** 2)
     rolled = np.linalg.norm(places[-1] - places[0]) / (0.5 * acceleration * result.t[-1] ** 2)
@@ -65,18 +64,12 @@ def rolling_down_a_ramp() -> float:
 @case
 def over_the_seam_of_two_cubes() -> float:
     corners, triangles = meshes.cube(2.0)
-    shell = sp.Shell(
-        np.vstack((corners - [0, 0, 1], corners + [2, 0, -1])),
-        np.vstack((triangles, triangles + len(corners))),
-    )
+    both = np.vstack((corners - [0, 0, 1], corners + [2, 0, -1]))
+    shell = sp.Shell(both, np.vstack((triangles, triangles + len(corners))))
     law, friction = sp.HuntCrossleyLaw(1e5, 1.5, 0.3), sp.CoulombFriction(0.3, 0.3, 0.01, 0.02)
     scene = models.on_shell(models.ball(radius=0.1), shell, law, friction, radius=0.1)
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(5e-5)).run(
-        models.free_q([0, 0, 0.1 - law.depth_at(GRAVITY)]),
-        v0=[5, 0, 0, 0, 50, 0],
-        duration=0.5,
-        record_dt=1e-3,
-    )
+    start = models.free_q([0, 0, 0.1 - law.depth_at(GRAVITY)]), [5, 0, 0, 0, 50, 0]
+    result = models.run(scene, sp.SemiImplicitEuler(5e-5), *start, duration=0.5, record_dt=1e-3)
     return float(np.ptp(result.q[:, 2]))
 
 
@@ -85,11 +78,8 @@ def restitution_one_keeps_the_height() -> float:
     height = 1.0
     plate = sp.Shell(*meshes.grid_plate(size=18.0, quads=True))
     scene = models.on_shell(models.ball(radius=0.1), plate, ELASTIC, radius=0.1)
-    result = sp.Simulation(scene, sp.Adaptive(1e-8)).run(
-        models.free_q([0, 0, 0.1 + height]),
-        duration=40 * np.sqrt(2 * height / GRAVITY),
-        record_dt=2e-3,
-    )
+    start, duration = models.free_q([0, 0, 0.1 + height]), 40 * np.sqrt(2 * height / GRAVITY)
+    result = models.run(scene, sp.Adaptive(1e-8), start, duration=duration, record_dt=2e-3)
     # A row may miss the top: height and speed give it.
     energy = result.q[:, 2] - 0.1 + result.v[:, 2] ** 2 / (2 * GRAVITY)
     return float(energy[result.q[:, 2] > 0.1 + 0.3 * height][-1] / height)
@@ -127,37 +117,27 @@ def pinched_rod() -> float:
         pad = sp.Sphere(0.01, frame=name)
         scene.add_contact(pad, rod, frame="held", law=law, friction=friction, name=name)
     x = 0.01 + radius - law.depth_at(force)
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(2e-5)).run(
-        np.array([-x, x, 0, 0, 0, 0, 0, 0, 1.0]),
-        duration=2.0,
-        controller=lambda _t, _q, v, _c: np.array(
-            [force - 2 * v[0], -force - 2 * v[1], *np.zeros(6)]
-        ),
-        control_dt=1e-3,
-        record_dt=0.01,
-    )
+
+    def squeeze(_t, _q, v, _contacts):
+        return np.array([force - 2 * v[0], -force - 2 * v[1], *np.zeros(6)])
+
+    more = {"controller": squeeze, "control_dt": 1e-3, "record_dt": 0.01}
+    start = np.array([-x, x, 0, 0, 0, 0, 0, 0, 1.0])
+    result = models.run(scene, sp.SemiImplicitEuler(2e-5), start, duration=2.0, **more)
     return late_speed(result, 1.0, 4)
 
 
 @case
 def pressing_hard_on_a_wall() -> float:
     finger = robots.load_file(robots.URDF_FOLDER / "three_link_finger.urdf")
-    wall = sp.Shell(
-        [[0.07, -0.1, 0], [0.07, 0.1, 0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]], [range(4)]
-    )
-    scene = sp.Scene(finger.model)
-    scene.add_contact(
-        sp.Sphere(0.01, frame="tip"),
-        wall,
-        law=sp.ImpactLaw(1e6, 1.5, 20.0, 1e-4),
-        friction=sp.BristleFriction(0.5, 0.4, 1e5, 20.0),
-        name="tip-wall",
-    )
+    corners = [[0.07, -0.1, 0], [0.07, 0.1, 0], [0.07, 0.1, 0.2], [0.07, -0.1, 0.2]]
+    scene, wall = sp.Scene(finger.model), sp.Shell(corners, [range(4)])
+    laws = sp.ImpactLaw(1e6, 1.5, 20.0, 1e-4), sp.BristleFriction(0.5, 0.4, 1e5, 20.0)
+    scene.add_contact(sp.Sphere(0.01, frame="tip"), wall, "universe", None, *laws)
     start = np.array([0.2, 0.6, 0.4])
     press = sp.JointPD(kp=20.0, kd=0.02, q_ref=start + 0.4)
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(2e-5)).run(
-        start, duration=2.0, controller=press, record_dt=1e-3
-    )
+    more = {"controller": press, "record_dt": 1e-3}
+    result = models.run(scene, sp.SemiImplicitEuler(2e-5), start, duration=2.0, **more)
     log = result.contacts
     force = log.normal_force[result.t[log.row] > 1.0]
     return float(np.ptp(force) / force.mean())
@@ -165,17 +145,16 @@ def pressing_hard_on_a_wall() -> float:
 
 @case
 def weight_of_a_ball_at_rest() -> float:
-    sim = sp.Simulation(plate_scene(models.ball(radius=0.1), None), sp.SemiImplicitEuler(1e-4))
-    log = sim.run(models.free_q([0, 0, 0.1 - DEPTH]), duration=0.5, record_dt=1e-2).contacts
+    scene, start = plate_scene(models.ball(radius=0.1), None), models.free_q([0, 0, 0.1 - DEPTH])
+    log = models.run(scene, EULER, start, duration=0.5, record_dt=1e-2).contacts
     return float(log.normal_force[log.row == log.row[-1]].sum() / GRAVITY)
 
 
 def rolled(spin: float) -> tuple[np.ndarray, np.ndarray]:
     """Return velocity and spin in the world of a ball that slid at first, spinning about z."""
     scene = plate_scene(models.ball(radius=0.1), sp.CoulombFriction(0.2, 0.2, 1e-3, 2e-3))
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        models.free_q([-1.5, 0.2, 0.1 - DEPTH]), [2.0, 0, 0, 0, 0, spin], 0.6, record_dt=0.01
-    )
+    start = models.free_q([-1.5, 0.2, 0.1 - DEPTH]), [2.0, 0, 0, 0, 0, spin]
+    result = models.run(scene, EULER, *start, duration=0.6, record_dt=0.01)
     rotation = pin.Quaternion(result.q[-1, 3:]).toRotationMatrix()
     return rotation @ result.v[-1, :3], rotation @ result.v[-1, 3:]
 
@@ -196,9 +175,8 @@ def spin_while_rolling() -> float:
 def reflected_at_a_seam() -> float:
     model = models.ball(gravity=0.0, radius=0.1)
     scene = plate_scene(model, None, sp.HuntCrossleyLaw(1e7, 1.5, 0.0))
-    result = sp.Simulation(scene, sp.Adaptive(1e-9)).run(
-        models.free_q([-0.2, 0.01, 0.3]), v0=[3.0, 0, -3.0, 0, 0, 0], duration=0.2, record_dt=0.01
-    )
+    start = models.free_q([-0.2, 0.01, 0.3]), [3.0, 0, -3.0, 0, 0, 0]
+    result = models.run(scene, sp.Adaptive(1e-9), *start, duration=0.2, record_dt=0.01)
     return float(result.v[-1, 2] / np.hypot(*result.v[-1, :2]))
 
 
@@ -207,7 +185,5 @@ def held_on_a_slope() -> float:
     slope = np.radians(20)
     model = models.block(radius=0.1, tilt=slope)
     scene = plate_scene(model, sp.BristleFriction(0.5, 0.4, 1e5, 20.0))
-    result = sp.Simulation(scene, sp.SemiImplicitEuler(1e-4)).run(
-        np.array([0.0, 0.0, 0.1]), duration=4.0, record_dt=0.01
-    )
+    result = models.run(scene, EULER, np.array([0.0, 0.0, 0.1]), duration=4.0, record_dt=0.01)
     return late_speed(result, 3.0, 0)

@@ -33,6 +33,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.robots.packages import Folders
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.study.robot_check import QUICK, check_robot
+from tests.tables import cases_of
 
 PARTS = Path(__file__).parents[1] / "data" / "corpus"
 LIMIT = 60
@@ -48,33 +49,9 @@ _ADVICE: dict[str, dict[str, Any]] = {
     **{said: {"mimic": False} for said in ("--no-mimic", "mimic = false")},
     "--free-flyer": {"free_flyer": True},
 }
-_VALUES = {
-    "dof": "7",
-    "ur_type": "ur5e",
-    "robot_model": "ur5",
-    "foot_collision": "default",
-    "rotors_description_dir": "{rotors_description}",
-    "joint_limit_params": "{ur_description}/config/ur5/joint_limits.yaml",
-    "kinematics_params": "{ur_description}/config/ur5/default_kinematics.yaml",
-    "physical_params": "{ur_description}/config/ur5/physical_parameters.yaml",
-    "visual_params": "{ur_description}/config/ur5/visual_parameters.yaml",
-}
-"""Of arguments that a file does not run without, as its repository's launch files have them.
-
-Names of packages in braces stand for their folders."""
-_NOT_THERE = "it includes a file that is not there, or not for these arguments"
-_KINDS = (
-    ("mesh cannot be loaded", "a collision mesh is not in the repository"),
-    ("there is no package", "a package is in none of the repositories"),
-    *((said, _NOT_THERE) for said in ("No such file", "Is a directory")),
-    ("Invalid parameter", "it gives a macro a parameter that the macro does not have"),
-    ("Undefined parameters", "it leaves out a parameter of a macro"),
-    ("unknown macro name", "it calls a macro that no file of it defines"),
-    ("<attach>", "MJCF with <attach>, which is not supported"),
-    ("a valid URDF model", "urdfdom, Pinocchio's parser, refuses it"),
-    ("impact tests met the shell", "no impact test met the shell (fast)"),
-    ("momentum failed", "momentum is off by more than allowed, relative to the contacts' impulse"),
-)
+_TABLES = cases_of("census")
+_VALUES, _KINDS = _TABLES["values"], _TABLES["kinds"]
+"""Values of arguments that files do not run without, and kinds of reasons by words in them."""
 
 
 @dataclass
@@ -241,10 +218,9 @@ def tables(rows: Sequence[Row]) -> list[Measured]:
     count = Counter(row.came_to for row in rows)
     loaded, times = len(rows) - count["not loaded"], [row.seconds for row in drafts]
     text = f"{len(rows)} files: {loaded} load ({loaded / len(rows):.0%}), {count['right']} pass "
-    text += (
-        f"check-robot ({count['right'] / len(rows):.0%}), {sum(bool(one.options) for one in rows)} "
-    )
-    text += "with options that refusals named."
+    with_options = sum(bool(one.options) for one in rows)
+    text += f"check-robot ({count['right'] / len(rows):.0%}), {with_options} with options that "
+    text += "refusals named."
     if drafts:
         text += f" Of {len(drafts)} scenarios that `new` was asked for it wrote "
         text += f"{sum(not row.new for row in drafts)}; seconds of the processor: median "
@@ -262,7 +238,7 @@ def tables(rows: Sequence[Row]) -> list[Measured]:
 
 def _kind(reason: str) -> str:
     """Return the kind of a reason, without what is of one file alone."""
-    kinds = (kind for word, kind in _KINDS if word in reason)
+    kinds = (kind for word, kind in _KINDS.items() if word in reason)
     return next(kinds, re.sub(r"/\S*/", "", reason)[:160])
 
 

@@ -14,9 +14,11 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import NameNotFound, RobotWarning
 from tests import urdf
+from tests.tables import cases_of
 
 FOLDER = Path(__file__).parents[1] / "data" / "xacro"
 INERTIAL = urdf.inertial()
+WRONG = cases_of("wrong_robots")
 
 
 def arm(tmp_path, *, collision="", visual="", name="arm.urdf"):
@@ -102,18 +104,7 @@ def test_limits_that_are_not_stated_are_none(tmp_path):
         assert not JointComponents.from_model(robots.load_file(file).model).limits
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("r.sdf", "SDF file.*convert it to MJCF"),
-        ("r.usda", "export a URDF or MJCF"),
-        ("r.dae", "is a mesh, .*URDF or MJCF with a link"),
-        ("r.step", "CAD file"),
-        ("r.srdf", "give the URDF as the file"),
-        ("r.txt", "root element is <model>; robots are read from URDF"),
-        ("r.xml", "not an MJCF that can be read: its root element is <model>"),
-    ],
-)
+@pytest.mark.parametrize(("name", "words"), WRONG["formats"])
 def test_other_formats_name_the_next_step(tmp_path, name, words):
     path = tmp_path / name
     path.write_text("<model/>")
@@ -164,17 +155,7 @@ def test_poses_of_an_srdf():
         robots.load_file(file, srdf=FOLDER / "nix.srdf")
 
 
-@pytest.mark.parametrize(
-    ("joint", "words"),
-    [
-        ("name='f1_base' value='nan'", "'f1_base': value 'nan' must be 1 finite number"),
-        ("name='f1_base' value='1 2 3'", "'f1_base': value '1 2 3' must be 1 finite number"),
-        ("name='f1_base' value='0.1_5'", "'f1_base': value '0.1_5' must be"),
-        ("name='f1_base'", "'f1_base': value '' must be"),
-        ("value='1'", "'': the robot has no such joint"),
-        ("name='universe' value='1'", "'universe': the robot has no such joint"),
-    ],
-)
+@pytest.mark.parametrize(("joint", "words"), WRONG["poses"])
 def test_poses_that_would_be_left_out_are_named(tmp_path, joint, words):
     srdf = tmp_path / "p.srdf"
     srdf.write_text(f"<robot name='h'><group_state name='p'><joint {joint}/></group_state></robot>")
@@ -248,14 +229,7 @@ def test_numbers_that_urdfdom_would_drop_with_their_part_are_refused(tmp_path):
         robots.load_file(file)
 
 
-@pytest.mark.parametrize(
-    ("mimic", "words"),
-    [
-        ("joint='nix'", "mimics 'nix', but the robot has no joint 'nix'"),
-        ("joint='j'", "'j' mimics 'j', which in the end mimics 'j' again"),
-        ("joint='j' multiplier='a'", "mimics 'j' by what is no number"),
-    ],
-)
+@pytest.mark.parametrize(("mimic", "words"), WRONG["mimics"])
 def test_wrong_mimic_joints_are_named(tmp_path, mimic, words):
     file = arm(tmp_path)
     file.write_text(file.read_text().replace("</joint>", f"<mimic {mimic}/></joint>"))

@@ -196,9 +196,8 @@ def test_a_collada_mesh_has_the_unit_that_it_states(tmp_path: Path, kind: str) -
 def test_a_speck_of_collision_geometry_is_no_mass_where_the_link_is_drawn(tmp_path: Path) -> None:
     drawn, large = urdf.shape("visual", BOX), urdf.shape("collision", BOX.replace("0.1", "1"))
     speck = urdf.shape("collision", BOX.replace("0.1", "1e-3"))
-    model = robots.load_file(
-        pair(tmp_path, speck, drawn, first=(large, drawn)), density=1000.0
-    ).model
+    file = pair(tmp_path, speck, drawn, first=(large, drawn))
+    model = robots.load_file(file, density=1000.0).model
     assert model.inertias[1].mass == pytest.approx(1.0)
 
 

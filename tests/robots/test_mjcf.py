@@ -13,6 +13,7 @@ from sphshell_pin.dynamics.scene.mimic import mimics
 from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mjcf_compile import silent
+from tests.tables import cases_of
 from tests.texts import text_of
 
 mujoco = pytest.importorskip("mujoco")
@@ -136,9 +137,8 @@ def test_equalities_of_joints_are_mimic_joints():
 def test_equalities_hold_between_distances_from_the_reference(tmp_path):
     """j1 - 0.2 = 0.1 + 0.5 (j2 - 0.3), of which j1 is the coordinate."""
     joints = ARM.replace('"j1"', '"j1" ref="0.2"').replace('"j2"', '"j2" ref="0.3"')
-    path = written(tmp_path, joints, '<compiler angle="radian"/>')
-    end = '<equality><joint joint1="j1" joint2="j2" polycoef="0.1 0.5"/></equality></mujoco>'
-    path.write_text(path.read_text().replace("</mujoco>", end))
+    equality = '<joint joint1="j1" joint2="j2" polycoef="0.1 0.5"/>'
+    path = written(tmp_path, joints, '<compiler angle="radian"/>', equality)
     (rule,) = mimics(robots.load_file(path, mimic=True).model).values()
     assert (rule.ratio, rule.offset) == pytest.approx((2.0, -2.0 * (0.2 + 0.1 - 0.5 * 0.3)))
 
@@ -170,9 +170,10 @@ def test_what_is_not_modeled_is_said():
 INERTIAL = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
 
 
-def written(tmp_path, inside, head=""):
+def written(tmp_path, inside, head="", equality=""):
     path = tmp_path / "r.xml"
-    path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody></mujoco>")
+    end = f"<equality>{equality}</equality>" if equality else ""
+    path.write_text(f"<mujoco>{head}<worldbody>{inside}</worldbody>{end}</mujoco>")
     return path
 
 
@@ -199,36 +200,18 @@ COUPLED = {
 
 @pytest.mark.parametrize("equality", COUPLED)
 def test_what_is_no_mimic_joint_is_refused_or_warned_of(tmp_path, equality):
-    words, path = COUPLED[equality], written(tmp_path, ARM)
-    end = f"<equality>{equality}</equality></mujoco>"
-    path.write_text(path.read_text().replace("</mujoco>", end))
+    words, path = COUPLED[equality], written(tmp_path, ARM, equality=equality)
     with pytest.raises(robots.RobotError, match=rf"not supported: .*{words}.*mimic = false"):
         robots.load_file(path, mimic=True)
     with pytest.warns(RobotWarning, match=rf"move freely that the file couples: .*{words}"):
         assert robots.load_file(path).model.nv == 3
 
 
-@pytest.mark.parametrize(
-    ("inside", "head", "words"),
-    [
-        ("<composite/>", "", "<composite> is not supported"),
-        (f"<replicate count='{10**9}'><geom size='1'/></replicate>", "", "has 1000000000 links"),
-        (f"{ARM}<geom size='1'><plugin plugin='p'/></geom>", "", "<plugin> is not supported"),
-        (ARM, "<compiler coordinate='global'/>", "coordinate"),
-        (ARM, "<include file='nix.xml'/>", "includes nix.xml, which is not there"),
-        ("<body><joint class='x'/></body>", "", "unknown default class name 'x'"),
-        ("<body><joint type='screw'/></body>", "", "invalid keyword: 'screw'"),
-        ("<geom size='1'/>", "", "has no <body>"),
-        ("<body><joint/><geom size='a'/></body>", "", "."),
-        ("<body name='b'><joint/></body>", "<compiler inertiafromgeom='false'/>", "'b' moves"),
-        ("<body pos='0 nan 0'><joint/><geom size='1'/></body>", "", "not finite"),
-        (f"<body name='b'>{7 * '<joint/>'}</body>", "", "more than 6 dofs in body 'b'"),
-    ],
-)
+@pytest.mark.parametrize(("inside", "head", "words"), cases_of("wrong_robots")["mjcf"])
 def test_what_cannot_be_read_is_said_in_a_sentence(tmp_path, monkeypatch, inside, head, words):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(robots.RobotError, match=rf"not an MJCF that can be read: .*{words}"):
-        robots.load_file(written(tmp_path, inside, head))
+        robots.load_file(written(tmp_path, inside.replace("ARM", ARM), head))
     assert {one.name for one in tmp_path.iterdir()} == {"r.xml"}  # no log of MuJoCo's
 
 

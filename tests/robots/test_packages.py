@@ -14,6 +14,7 @@ from sphshell_pin.robots.finding import find_robots
 from sphshell_pin.robots.packages import Folders
 from tests import urdf
 from tests.command import call
+from tests.tables import cases_of
 from tests.texts import DATA
 
 
@@ -131,14 +132,7 @@ def test_a_mesh_of_another_folder_is_not_taken_for_a_missing_one(tmp_path, other
         robots.load_file(file)
 
 
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ('<xacro:include filename="$(arg kind).xacro"/>', "sets: kind (none)"),
-        ('<xacro:arg name="size"/>', "xacro:arg: missing attribute 'default'"),
-        ('<xacro:include filename="$(find far)/a.xacro"/>', "expand it: there is no package 'far'"),
-    ],
-)
+@pytest.mark.parametrize(("line", "said"), cases_of("wrong_robots")["xacro"])
 def test_a_xacro_that_fails_says_which_arguments_it_has(tmp_path, line, said):
     file = urdf.xacro(tmp_path / "arm.xacro", '<xacro:arg name="kind" default="none"/>', line)
     with pytest.raises(robots.RobotError, match=re.escape(said)):

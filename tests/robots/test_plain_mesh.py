@@ -17,6 +17,7 @@ from sphshell_pin.errors import RobotWarning
 from sphshell_pin.robots.mesh_faults import mesh_fault
 from sphshell_pin.robots.plain_mesh import FORMATS, plain_mesh
 from tests import urdf
+from tests.texts import text_of
 
 HEAD = '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema">'
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nusemtl a\nf 1/1/1 2//1 3\n"
@@ -30,9 +31,8 @@ def test_an_obj_file_keeps_its_numbers_alone(start):
     content = OBJ.replace(b"\n", b"\r") if start.endswith("\r") else OBJ
     made = plain_mesh(".obj", start.replace("LIB", "mtllib /etc/passwd").encode() + content)
     assert made is not None
-    assert made.endswith(
-        b"v 0.0 0.0 0.0\nv 1.0 0.0 0.0\nv 0.0 1.0 0.0\nvn 0.0 0.0 1.0\nf 1//1 2//1 3\n"
-    )
+    vertices = b"v 0.0 0.0 0.0\nv 1.0 0.0 0.0\nv 0.0 1.0 0.0\n"
+    assert made.endswith(vertices + b"vn 0.0 0.0 1.0\nf 1//1 2//1 3\n")
     assert not {word for word in made.split() if word.isalpha()} - {b"v", b"vn", b"f"}
     assert plain_mesh(".obj", made) == made
 
@@ -69,10 +69,8 @@ def test_what_a_mesh_names_is_a_regular_file(name, content, kind, tmp_path):
 
 def test_a_collada_file_keeps_what_is_drawn_and_no_names_of_files():
     phong = "<phong><diffuse><texture texture='t'/><color>1 0 0 1</color></diffuse></phong>"
-    effect = (
-        f"<effect id='e'><profile_COMMON><technique>{phong}</technique></profile_COMMON></effect>"
-    )
-    library = f"<library_effects>{effect}</library_effects>"
+    common = f"<profile_COMMON><technique>{phong}</technique></profile_COMMON>"
+    library = f"<library_effects><effect id='e'>{common}</effect></library_effects>"
     images = "<library_images><image><init_from>/etc/passwd</init_from></image></library_images>"
     nodes = '<scene><instance_visual_scene url="#s"/><instance_physics_scene url="#s"/></scene>'
     abroad = '<library_nodes><node><instance_node url="other.dae#n"/></node></library_nodes>'
@@ -86,26 +84,12 @@ def test_a_collada_file_keeps_what_is_drawn_and_no_names_of_files():
         drawn = ["color", "instance_visual_scene"]
         assert [tag for tag in tags if tag in drawn] == drawn
         assert plain_mesh(".dae", made) == made
-    for wrong in (
-        "<a/>",
-        f"{HEAD}<!DOCTYPE a></COLLADA>",
-        f"{HEAD}<translate>a b</translate></COLLADA>",
-    ):
-        assert plain_mesh(".dae", wrong.encode()) is None
+    for wrong in ("<!DOCTYPE a>", "<translate>a b</translate>"):
+        assert plain_mesh(".dae", f"{HEAD}{wrong}</COLLADA>".encode()) is None
+    assert plain_mesh(".dae", b"<a/>") is None
 
 
-TRIANGLE = (
-    HEAD
-    + '<library_geometries><geometry id="g"><mesh><source id="s"><float_array id="a" count="9">'
-    '0 0 0 1 0 0 0 1 0</float_array><technique_common><accessor source="#a" count="3" stride="3">'
-    '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>'
-    '</accessor></technique_common></source><vertices id="v"><input semantic="POSITION" '
-    'source="#s"/></vertices><triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/>'
-    "<p>{p}</p></triangles></mesh></geometry></library_geometries><library_nodes>{library}"
-    '</library_nodes><library_visual_scenes><visual_scene id="w"><node id="n">{node}</node>'
-    '</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#w"/></scene>'
-    "</COLLADA>"
-)
+TRIANGLE = text_of("robots/triangle.dae")
 DRAWN = '<instance_geometry url="#g"/>'
 ROWS = [[k + 1] * 10 for k in range(5)]
 

@@ -84,9 +84,7 @@ def test_the_base_of_a_shipped_robot_is_what_it_is_asked_to_be(name):
         places, names = [], []
         for (model, data), robot in zip(shown, (plain, fixed), strict=True):
             bodies = getattr(robot, kind).geometryObjects
-            places.append(
-                [(data.oMi[one.parentJoint] * one.placement).homogeneous for one in bodies]
-            )
+            places.append([data.oMi[one.parentJoint] * one.placement for one in bodies])
             names.append([model.frames[one.parentFrame].name for one in bodies])
-        np.testing.assert_allclose(*places, atol=1e-12)
+        assert all(one.isApprox(other, 1e-12) for one, other in zip(*places, strict=True))
         assert names[0] == names[1]

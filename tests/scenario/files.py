@@ -12,9 +12,9 @@ from tests import urdf
 from tests.models import pose_of
 from tests.texts import text_of
 
-DROP, FINGER, EGG, HAND, TIP_AT, TWO_BALLS, TWO_ROBOTS = (
+DROP, FINGER, EGG, HAND, TIP_AT, TWO_BALLS = (
     text_of(f"scenarios/{name}.toml")
-    for name in ("drop", "finger", "egg", "hand", "tip_at", "two_balls", "finger_and_ball")
+    for name in ("drop", "finger", "egg", "hand", "tip_at", "two_balls")
 )
 SENSORS = DROP + text_of("scenarios/sensors.toml")
 
@@ -30,7 +30,8 @@ def run_well(built):
     """Run a scenario; it comes to its end, and to all figures that it expects."""
     result, stopped = simulate(built)
     assert stopped is None
-    assert [one.figure for one in judge(built, result) if not one.met] == []
+    missed = [one for one in judge(built, result) if not one.met]
+    assert [(one.figure, one.measured, one.expected) for one in missed] == []
     return result
 
 

@@ -10,16 +10,7 @@ def link(name: str, size: str = "", at: str = "0 0 0", *parts: str, mass: float 
     return urdf.link(name, inertial(mass, 0.01), *box, *parts)
 
 
-def limb(
-    name: str,
-    parent: str,
-    at: str,
-    *body: str,
-    kind: str = "revolute",
-    axis: str = "0 1 0",
-    limits: tuple[float, float] = (-1, 1),
-    more: str = "",
-) -> str:
+def limb(name, parent, at, *body, kind="revolute", axis="0 1 0", limits=(-1, 1), more="") -> str:
     """A link, as `link` makes it of `body`, on a joint of its parent that is called NAME_j."""
     joint = urdf.joint(f"{name}_j", kind, parent, name, more, at=at, axis=axis)
     low, high = limits

@@ -115,11 +115,8 @@ def killed_at(n: int, write: Callable[[], object]) -> bool:
 
 def contents(folder: Path) -> dict[str, bytes]:
     """Return every file below `folder` by its name, hidden ones as well."""
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file()
-    }
+    files = filter(Path.is_file, sorted(folder.rglob("*")))
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
 
 
 def visible(folder: Path) -> dict[str, bytes]:

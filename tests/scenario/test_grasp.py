@@ -14,7 +14,6 @@ from sphshell_pin.scenario.drafting.force_balance import least_friction
 from sphshell_pin.scenario.drafting.grasp import Grasp, Hand
 from sphshell_pin.scenario.drafting.hand import GAP, _pressed
 from sphshell_pin.scenario.drafting.limb_ends import Tip
-from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.part import Part
 from sphshell_pin.scenario.format.shape_tables import Box, Cylinder
 from tests.models import pose_of
@@ -64,10 +63,6 @@ def test_a_part_weighs_what_its_material_weighs():
     assert loaded.model.nq == 7
 
 
-def out(folder):
-    return folder / "made.toml"
-
-
 ALONG_Y = pin.SE3(pin.rpy.rpyToMatrix(np.pi / 2, 0, 0), np.array([0, 0, -0.1]))
 ROD = Cylinder(radius=0.02, length=0.2)
 
@@ -78,7 +73,7 @@ def hand_of():
     return Hand(loaded.model, tips)
 
 
-def test_fingers_close_on_a_part(tmp_path):
+def test_fingers_close_on_a_part():
     """All centers stand a radius and the gap away from a cylinder: a distance to its axis."""
     hand, gaps = hand_of(), np.array([1e-4, 2e-4, -1e-4])
     q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell_of(ROD), ALONG_Y, gaps)
@@ -89,7 +84,7 @@ def test_fingers_close_on_a_part(tmp_path):
     assert np.allclose(points, centers - (away - 0.02)[:, None] * normals, atol=2e-6)
 
 
-def test_torques_do_the_work_of_the_forces(tmp_path):
+def test_torques_do_the_work_of_the_forces():
     """Virtual work: of forces on points that move with the tips."""
     hand = hand_of()
     q, points, normals = hand.close_on(np.tile([-0.3, 0.6], 3), shell_of(ROD), ALONG_Y, 0.0)
@@ -125,7 +120,7 @@ def test_the_finger_that_presses_most_presses_as_asked(dense):
     assert found.forces[:, 2].sum() == pytest.approx(9.81 * part.inertia.mass, rel=1e-4)
 
 
-def test_what_is_out_of_reach_is_not_touched(tmp_path):
+def test_what_is_out_of_reach_is_not_touched():
     hand, shell = hand_of(), shell_of(Box([0.02, 0.02, 0.02]))
     far = pin.SE3(np.eye(3), np.array([0, 0, -0.5]))
     assert hand.close_on(np.zeros(6), shell, far, GAP) is None
@@ -134,9 +129,9 @@ def test_what_is_out_of_reach_is_not_touched(tmp_path):
 @pytest.mark.parametrize(
     "surface", mostly_studies(["box", "cylinder", "sphere"], lambda one: one != "cylinder")
 )
-def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
-    made = new_scenario(GRIPPER, surface, tips="all", against="plastic", out=out(tmp_path))
-    assert (tmp_path / "made_part.urdf").is_file()
+def test_a_hand_holds_what_new_gives_it(surface, draft, tmp_path):
+    made = draft(GRIPPER, surface, tips="all", against="plastic")
+    assert (tmp_path / "a_part.urdf").is_file()
     built = build(made.path)  # what stands in the files, read again
     gaps = [pair.gap for pair in built.scene.explain(built.q0, built.v0).pairs]
     assert gaps == pytest.approx([GAP] * 3, abs=2e-6)
@@ -148,18 +143,18 @@ def test_a_hand_holds_what_new_gives_it(surface, tmp_path):
     assert np.allclose(-forces[log.row == last].sum(axis=0), [0, 0, 9.81 * mass], atol=0.02)
 
 
-def test_a_part_that_is_too_heavy_of_steel_is_of_plastic(tmp_path):
+def test_a_part_that_is_too_heavy_of_steel_is_of_plastic(draft, tmp_path):
     import trimesh
 
     file = tmp_path / "block.stl"
     trimesh.creation.box((0.06, 0.06, 0.12)).export(file)
-    made = new_scenario(GRIPPER, file, tips="all", unit="m", out=out(tmp_path))
+    made = draft(GRIPPER, file, tips="all", unit="m")
     assert made.why[0].startswith("the part is of plastic, as with steel no grasp of")
     with pytest.raises(SphshellError, match="a lighter --against"):
-        new_scenario(GRIPPER, file, tips="all", unit="m", against="steel", out=tmp_path / "b.toml")
+        draft(GRIPPER, file, tips="all", unit="m", against="steel")
 
 
-def test_fingers_that_mimic_others_hold_too(tmp_path):
+def test_fingers_that_mimic_others_hold_too(draft, tmp_path):
     """Two fingers move as one; motors make up for friction that would keep them from pressing."""
     file, text = tmp_path / "gripper.urdf", GRIPPER.read_text("utf-8")
     for link in ("upper", "lower"):
@@ -167,7 +162,7 @@ def test_fingers_that_mimic_others_hold_too(tmp_path):
         text = f'{text[:at]}<mimic joint="left_{link}_hinge"/>{text[at:]}'
     text = text.replace("</joint>", '<dynamics damping="0" friction="2"/></joint>')
     file.write_text(text, encoding="utf-8")
-    made = new_scenario(file, "cylinder", tips="all", against="plastic", out=out(tmp_path))
+    made = draft(file, "cylinder", tips="all", against="plastic")
     built = build(made.path)
     assert built.scene.model.nv == 4 + 6
     assert built.scenario.robot[0].joints == ["limits", "friction", "effort", "speed"]

@@ -134,13 +134,7 @@ def test_a_dragged_arm_gives_way_and_comes_back(arm) -> None:
     moved = arm.drag.point_world - before
     assert moved @ [0.6 - before[0], 0.0, 0.1 - before[2]] > 0.0
     # At rest the controller's torques are those of the spring.
-    model, data = arm.scene.model, arm.scene.model.createData()
-    frame = model.getFrameId("lower")
-    pin.computeJointJacobians(model, data, arm.q)
-    pin.updateFramePlacements(model, data)
-    jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-    arm_of = data.oMf[frame].rotation @ [0.0, 0.0, 0.3]
-    at_point = jacobian[:3] - pin.skew(arm_of) @ jacobian[3:]
+    at_point = models.jacobian_of(arm.scene.model, arm.q, "lower", [0.0, 0.0, 0.3])[:3]
     np.testing.assert_allclose(at_point.T @ arm.drag.force_world, 60.0 * (arm.q - rest), atol=1e-4)
     arm.release()
     settle(arm)

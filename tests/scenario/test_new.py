@@ -2,22 +2,13 @@
 
 import shutil
 import tomllib
-from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from sphshell_pin import robots
-from sphshell_pin.errors import (
-    FrameNotFound,
-    InvalidParameter,
-    NameNotFound,
-    ResultError,
-    ScenarioError,
-    SphshellError,
-    UnitMissing,
-)
+from sphshell_pin.errors import NameNotFound, ResultError, ScenarioError
 from sphshell_pin.scenario import build, shipped_scenarios
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.running.run import simulate
@@ -27,7 +18,6 @@ from tests.shell.surfaces import surface_file
 from tests.studies import mostly_studies
 
 SURFACES = next(iter(shipped_scenarios().values())).parent / "surfaces"
-PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 BLADE, BOWL = SURFACES / "bladex_upper.stl", SURFACES / "bowl.shl"
 
 CASES = [
@@ -123,41 +113,6 @@ def test_the_ball_comes_back_as_high_as_its_material_says(draft):
     after = result.t > touched + 0.01
     rising = result.v[after, 2][0] + 9.81 * (result.t[after][0] - touched)
     assert rising / np.sqrt(2 * 9.81 * 0.024) == pytest.approx(0.6, rel=0.03)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "error", "match"),
-    [
-        (("pandda",), {}, NameNotFound, "no robot 'pandda'"),
-        (("nix.urdf",), {}, SphshellError, "nix.urdf: no such file"),
-        (("ball", "blub"), {}, NameNotFound, "plane, box, sphere, cylinder, bowl"),
-        (("ball", "blub.stl"), {}, SphshellError, "surface blub.stl: no such file"),
-        (("ball", BLADE), {}, UnitMissing, "must be stated"),
-        (("ball", "plane"), {"unit": "mm"}, SphshellError, "sized in meters"),
-        (("ball", "plane"), {"faces": [3]}, SphshellError, "not to the plane"),
-        ((BLADE,), {}, SphshellError, "is a mesh, without joints"),
-        (("ball",), {"frame": "bal"}, FrameNotFound, "no frame 'bal'"),
-        (("ball",), {"radius": -1.0}, InvalidParameter, "must be positive"),
-        ((PROBE,), {"radius": 12.0}, InvalidParameter, "radius = 12.0 .* than the robot's reach"),
-        (("ball",), {"press": 3.0}, SphshellError, "leave out --press"),
-        (("ball",), {"at": (0.0, 0.0, 0.0)}, SphshellError, "leave out --press, --place, --at and"),
-        (("ball",), {"material": "iron"}, NameNotFound, "steel, aluminium"),
-        (("ball",), {"against": "iron"}, NameNotFound, "steel, aluminium"),
-        (("ball",), {"base": "fixed"}, SphshellError, "no joint: .* --base floating"),
-        (("solo12",), {"press": 3.0}, SphshellError, "leave out --press, .* with --base fixed"),
-        (("ball",), {"place": "left"}, NameNotFound, "below, above"),
-        (("ball",), {"xacro_args": {"a": "1"}}, SphshellError, "belong to a file, not to ball"),
-        (("ball", BLADE), {"unit": "um"}, SphshellError, r"less than the sphere's radius .*mm$"),
-        (("three_link_finger",), {"frame": "base", "radius": 0.01}, SphshellError, "no joint"),
-    ],
-)
-def test_what_cannot_be_found_out_is_asked_for_in_one_sentence(
-    arguments, options, error, match, draft, tmp_path
-):
-    with pytest.raises(error, match=match) as caught:
-        draft(*arguments, **options)
-    assert "\n" not in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_is_there_stays(tmp_path):

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import coal
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import sphshell_pin as sp
@@ -12,6 +11,7 @@ from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.new import new_scenario
 from sphshell_pin.scenario.drafting.touch_points import sides
 from sphshell_pin.scenario.running.run import simulate
+from tests.models import jacobian_of
 from tests.scenario.files import center_of
 
 GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
@@ -19,12 +19,8 @@ GANTRY = Path(__file__).parents[1] / "data" / "robots" / "gantry.urdf.xacro"
 
 def placed(built):
     """Return the vertices of the surface in the world, and its placement."""
-    (pair,) = built.scene.pairs
-    corners = (
-        pair.side_j.shell.vertices @ pair.side_j.placement.rotation.T
-        + pair.side_j.placement.translation
-    )
-    return corners, pair.side_j.placement
+    (side,) = (pair.side_j for pair in built.scene.pairs)
+    return side.shell.transformed(side.placement).vertices, side.placement
 
 
 def way(built):
@@ -42,11 +38,8 @@ def test_a_part_lies_before_a_bent_arm_as_on_a_table(arm, plate, draft, tmp_path
     (contact,) = made.built.scene.explain(made.built.q0).pairs
     assert contact.gap > 0
     # All six directions of the tip are free, and no joint is at a limit.
-    model, q = made.built.scene.model, made.built.q0
-    jacobian = pin.computeFrameJacobian(
-        model, model.createData(), q, model.getFrameId("link_5"), pin.LOCAL_WORLD_ALIGNED
-    )
-    values = np.linalg.svd(jacobian, compute_uv=False)
+    q = made.built.q0
+    values = np.linalg.svd(jacobian_of(made.built.scene.model, q, "link_5"), compute_uv=False)
     assert values[-1] > 0.02 * values[0]
     assert np.abs(q).max() < 2.75
     assert np.linalg.norm(way(made.built)[-1] - way(made.built)[0]) > 0.05
@@ -80,9 +73,8 @@ def test_a_gantry_slides(plate, draft):
     assert control.rotational_stiffness == 0.0
     result, _ = simulate(made.built)
     moved = np.linalg.norm(result.q[-1][:2] - result.q[0][:2])
-    assert moved == pytest.approx(
-        np.linalg.norm(way(made.built)[-1] - way(made.built)[0]), rel=0.05
-    )
+    first, *_, last = way(made.built)
+    assert moved == pytest.approx(np.linalg.norm(last - first), rel=0.05)
 
 
 def test_a_point_of_the_part_is_touched(arm, plate, draft, tmp_path):
@@ -95,34 +87,32 @@ def test_a_point_of_the_part_is_touched(arm, plate, draft, tmp_path):
     np.testing.assert_allclose(placed(built)[1].rotation @ [1, 0, 0], [0, 0, 1], atol=1e-9)
 
 
-def test_a_face_is_touched_by_its_kind_and_size(arm, tmp_path):
+def test_a_face_is_touched_by_its_kind_and_size(arm, draft, tmp_path):
     """A cylinder of 40 mm on its end: its mantle, or the larger of its planes."""
     sp.Shell.from_geometry(coal.Cylinder(0.04, 0.1)).to_file(tmp_path / "rod.shl")
-    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
     for text in ("cylinder", "cylinder 40 mm", "cylinders of radius 40 mm"):
-        built = new_scenario(arm, tmp_path / "rod.shl", at=text, **options).built
+        built = draft(arm, tmp_path / "rod.shl", radius=0.01, at=text).built
         assert np.linalg.norm(way(built)[0][:2]) == pytest.approx(0.04, rel=2e-3)
-    built = new_scenario(arm, tmp_path / "rod.shl", at="plane", **options).built
+    built = draft(arm, tmp_path / "rod.shl", radius=0.01, at="plane").built
     assert abs(way(built)[0][2]) == pytest.approx(0.05, abs=1e-6)
     with pytest.raises(SphshellError, match=r"has no face 'cylinder 30 mm'; .*radius 40 mm"):
-        new_scenario(arm, tmp_path / "rod.shl", at="cylinder 30 mm", **options)
+        draft(arm, tmp_path / "rod.shl", radius=0.01, at="cylinder 30 mm")
     with pytest.raises(SphshellError, match=r"no face 'lid': give x,y,z"):
-        new_scenario(arm, tmp_path / "rod.shl", at="lid", **options)
+        draft(arm, tmp_path / "rod.shl", radius=0.01, at="lid")
 
 
 def length_of(points):
     return np.linalg.norm(np.diff(points, axis=0), axis=1).sum()
 
 
-def test_the_path_has_the_shape_and_length_asked_for(arm, plate, tmp_path):
-    options = {"radius": 0.01, "out": tmp_path / "a.toml", "force": True}
-    line = way(new_scenario(arm, plate, path="line", length=0.08, **options).built)
+def test_the_path_has_the_shape_and_length_asked_for(arm, plate, draft):
+    line = way(draft(arm, plate, radius=0.01, path="line", length=0.08).built)
     assert length_of(line) == pytest.approx(0.08, abs=0.005)
-    circle = way(new_scenario(arm, plate, path="circle", length=0.1, **options).built)
+    circle = way(draft(arm, plate, radius=0.01, path="circle", length=0.1).built)
     np.testing.assert_allclose(circle[0], circle[-1], atol=1e-5)
     away = np.linalg.norm(circle[:-1] - circle[:-1].mean(axis=0), axis=1)
     np.testing.assert_allclose(away, 0.1 / (2 * np.pi), rtol=1e-2)
-    made = new_scenario(arm, plate, path="raster", length=0.12, **options)
+    made = draft(arm, plate, radius=0.01, path="raster", length=0.12)
     raster = way(made.built)
     assert len(raster) == 10
     assert length_of(raster) == pytest.approx(0.12, rel=1e-3)

@@ -26,13 +26,11 @@ from sphshell_pin.scenario.drafting.trial import Fault, _force_fault, _path_faul
 from sphshell_pin.scenario.running.run import simulate
 from tests import models, urdf
 from tests.scenario.files import center_of, run_well
-from tests.studies import mostly_studies
 from tests.texts import DATA
 
-PROBE = DATA / "robots" / "arm_with_probe.urdf"
+PROBE, BIPED = (DATA / "robots" / name for name in ("arm_with_probe.urdf", "biped.xml"))
 BLADE = next(iter(shipped_scenarios().values())).parent / "surfaces" / "bladex_upper.stl"
 FINGER = (robots.URDF_FOLDER / "three_link_finger.urdf").read_text()
-GRIPPER = DATA / "robots" / "three_fingers.urdf"  # two fingers against one
 PLACES = ("below", "above", "+x", "-x", "+y", "-y")
 
 
@@ -92,64 +90,6 @@ def test_a_closed_body_has_one_side(surface, side, draft):
     assert 0 < pair.gap < 0.03
 
 
-HAND = {"robot": GRIPPER, "surface": "box", "tips": "all"}
-REFUSED = [
-    ({"robot": "three_link_finger", "place": "+y"}, r"cannot move along \+y in any posture"),
-    (
-        {"robot": "gear_pair", "frame": "gear_1", "radius": 0.01},
-        "gear_1. cannot move along any axis",
-    ),
-    # The place and the path.
-    ({"at": (1.0, 0.0, 0.0)}, r"\[1, 0, 0\] is 850 mm off the surface"),
-    ({"at": (1.0, 0.0)}, r"must have shape \(3,\)"),
-    ({"path": "spiral"}, "must be line, circle, raster, or points"),
-    ({"path": "1,2; 3,4"}, "must be line, circle, raster, or points"),
-    ({"path": "line", "length": 1.0}, "cannot be taken: .*shorter --length"),
-    ({"length": 0.1}, "belongs to a path of line, circle, raster"),
-    ({"path": [[0, 0, 0.04]], "at": (0, 0, 0.04)}, "leave it out"),
-    # A hand about a part.
-    (HAND | {"surface": "plane"}, "a hand cannot hold a plane"),
-    (HAND | {"place": "below"}, "--place belongs to a single tip"),
-    (HAND | {"radius": 0.01}, "--radius belongs to a single tip"),
-    (HAND | {"robot": "three_link_finger"}, "needs two fingertips or more"),
-    (HAND | {"robot": "turntable"}, "this robot has 1"),
-    (HAND | {"against": "steel", "press": 500.0}, "no grasp .* works"),
-    (HAND | {"unit": "m", "surface": "large.stl"}, "cannot hold a part of 400 x 400 x 400 mm"),
-    (HAND | {"unit": "m", "surface": "sheet.obj"}, "is open, so it has no weight"),
-]
-SLOWER = [
-    ({"robot": "three_link_finger", "press": 1e4}, "allow a push of"),
-    ({"robot": PROBE, "press": 1e3}, r"effort limits allow a push of [\d.]+ N along"),
-    ({"robot": PROBE, "press": 50.0, "material": "silicone"}, "by more than half of it"),
-]
-
-
-@pytest.fixture(scope="module")
-def parts(tmp_path_factory):
-    """A folder with a part that is too large for a hand, and one that is open."""
-    folder = tmp_path_factory.mktemp("parts")
-    trimesh.creation.box((0.4, 0.4, 0.4)).export(folder / "large.stl")
-    (folder / "sheet.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n")
-    return folder
-
-
-@pytest.mark.parametrize(
-    ("options", "match"), mostly_studies(REFUSED + SLOWER, REFUSED.__contains__)
-)
-def test_what_would_not_work_is_refused(
-    options, match, draft, arm, plate, parts, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(parts)
-    asked = {"robot": arm, "surface": plate, "radius": 0.01, **options}
-    if "robot" in options:
-        asked = {"surface": "plane", **options}
-    robot, surface = asked.pop("robot"), asked.pop("surface")
-    with pytest.raises(SphshellError, match=match) as caught:
-        draft(robot, surface, **asked)
-    assert "\n" not in str(caught.value)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_robot_on_four_legs_stands(draft):
     """Its joints give way by what they were drafted for, 0.05 rad, and it sinks by little."""
     built = draft("solo12", "plane").built
@@ -171,22 +111,9 @@ def test_what_cannot_stand_on_a_part_is_held_and_touches_it_with_one_foot(draft)
 
 
 def test_a_biped_whose_foot_is_beside_the_part_is_held(tmp_path):
-    inertial = '<inertial pos="0 0 0" mass="{}" diaginertia="0.1 0.1 0.1"/>'
-    legs = "".join(
-        f'<body name="{side}" pos="0 {y} -0.1"><joint name="{side}_hip" axis="0 1 0"/>'
-        f'<joint name="{side}_knee" axis="0 1 0" pos="0 0 -0.2"/>{inertial.format(1)}'
-        f'<geom name="{side}_foot" type="sphere" size="0.02" pos="0.1 0 -0.4"/></body>'
-        for side, y in (("left", 0.2), ("right", -0.2))
-    )
-    robot = tmp_path / "biped.xml"
-    base = inertial.format(3)
-    robot.write_text(
-        f'<mujoco><worldbody><body name="base" pos="0 0 0.6"><freejoint/>{base}{legs}</body>'
-        "</worldbody></mujoco>"
-    )
     block = tmp_path / "block.stl"
     trimesh.creation.box((0.1, 0.1, 0.02)).export(block)
-    made = new_scenario(robot, block, unit="m", out=tmp_path / "a.toml")
+    made = new_scenario(BIPED, block, unit="m", out=tmp_path / "a.toml")
     assert "comes down beside the surface" in made.why[0]
     assert build(made.path).scene.model.nv <= 4
 
@@ -306,9 +233,8 @@ def test_a_round_end_is_the_sphere_and_a_flat_one_gets_a_ball():
         frame = robot.model.frames[link]
         at = frame.placement * pin.SE3(np.eye(3), np.array([0, 0, 0.05]))
         geometry.addGeometryObject(pin.GeometryObject("end", frame.parentJoint, link, at, shape))
-        (tip,) = find_tips(
-            replace(robot, collision_model=geometry), shipped=None, frame=None, radius=None
-        )
+        ended = replace(robot, collision_model=geometry)
+        (tip,) = find_tips(ended, shipped=None, frame=None, radius=None)
         assert radius is None or tip.radius == pytest.approx(radius, rel=0.03)
         assert tip.offset == pytest.approx([0, 0, 0.1 + above * tip.radius], abs=1e-3)
         assert words in tip.source
@@ -381,9 +307,8 @@ def test_a_tip_may_stay_behind_the_end_of_its_path_by_a_part_of_its_radius(aside
     radius, place = 0.05, pin.SE3(pin.utils.rotate("x", 0.3), np.array([0.1, 0.2, 0.3]))
     scene = sp.Scene(models.ball(joint=pin.JointModelTranslation()))
     tip = Tip("ball", radius, np.array([0.01, 0.0, 0.02]), "")
-    scene.add_contact(
-        sp.Sphere(radius, "ball", tip.offset), models.plate(), placement=place, law=models.LAW
-    )
+    sphere = sp.Sphere(radius, "ball", tip.offset)
+    scene.add_contact(sphere, models.plate(), placement=place, law=models.LAW)
     start, end = (place.act(np.add(one, [0, 0, radius])) - tip.offset for one in PATH)
     behind = end - place.rotation @ [aside * radius, 0.0, 0.0]
     plan = SimpleNamespace(control=pressing(PATH), tips=(tip,))

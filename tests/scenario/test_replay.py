@@ -32,9 +32,8 @@ def replay(folder):
 
 
 def test_a_shipped_scenario_is_found_by_its_name(tmp_path):
-    report = run_built(
-        build("sphere_on_shell", {"run.duration": "0.01"}), tmp_path, recording=False
-    )
+    built = build("sphere_on_shell", {"run.duration": "0.01"})
+    report = run_built(built, tmp_path, recording=False)
     assert report.result.origin.scenario == "sphere_on_shell"
     assert Replay(tmp_path / "run.npz").visual_model is not None
     lost = dataclasses.replace(report.result.origin, keep=None)

@@ -68,11 +68,8 @@ def test_a_path_that_begins_beside_the_tip(scenario):
 def test_a_start_beyond_a_limit(scenario):
     model = build(scenario).scene.model
     name, high = model.names[1], model.upperPositionLimit[0]
-    (said,) = [
-        one
-        for one in told(scenario, {f"robot.start.{name}": repr(float(high) + 0.25)})
-        if "limits" in one
-    ]
+    beyond = {f"robot.start.{name}": repr(float(high) + 0.25)}
+    (said,) = [one for one in told(scenario, beyond) if "limits" in one]
     assert said.startswith(f"joint '{name}' starts at {high + 0.25:.6g}, beyond its limits")
     assert f"to {high:.6g} " in said
 
@@ -108,9 +105,8 @@ def test_a_robot_whose_joints_are_at_one_place_is_as_large_as_its_links():
     model = pin.Model()
     cart = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "cart")
     pole = model.addJoint(cart, pin.JointModelRY(), pin.SE3.Identity(), "pole")
-    model.appendBodyToJoint(
-        pole, pin.Inertia.FromSphere(1.0, 0.05), pin.SE3(np.eye(3), np.array([0.0, 0.3, 0.4]))
-    )
+    above = pin.SE3(np.eye(3), np.array([0.0, 0.3, 0.4]))
+    model.appendBodyToJoint(pole, pin.Inertia.FromSphere(1.0, 0.05), above)
     assert model_reach(model) == pytest.approx(0.5)
     sliding, _ = targets_of(sp.JointPD(10.0, 1.0), model, pin.neutral(model))
     assert (sliding.low, sliding.high) == pytest.approx((-0.5, 0.5))
@@ -130,10 +126,7 @@ def test_the_commands_say_so(scenario, tmp_path):
     ("arguments", "said"),
     [
         ("t, q", r"'tau\(t, q\)' must take tau\(t, q, v, contacts\)"),
-        (
-            "t, q, v, contacts, gain",
-            r"gain\)' must take tau\(t, q, v, contacts\).*'gain'",
-        ),
+        ("t, q, v, contacts, gain", r"gain\)' must take tau\(t, q, v, contacts\).*'gain'"),
     ],
 )
 def test_a_callable_of_the_wrong_signature(arguments, said, tmp_path):

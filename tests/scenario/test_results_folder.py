@@ -9,6 +9,7 @@ import signal
 import stat
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
@@ -31,9 +32,8 @@ def put(folder, text, last=LAST):
         for name in ("a", last):
             (staging / name).write_text(text)
         place.replace(staging, ["a", "b", last])
-    return {
-        path.name: path.read_text(errors="replace") for path in folder.iterdir() if path.is_file()
-    }
+    files = filter(Path.is_file, folder.iterdir())
+    return {path.name: path.read_text(errors="replace") for path in files}
 
 
 def test_a_second_run_is_told_who_writes_until_that_process_is_killed(

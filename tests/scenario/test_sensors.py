@@ -27,10 +27,8 @@ def test_a_scenario_states_its_sensors(tmp_path):
     names = {file.name for file in report.files}
     assert {"sensors.csv", "sensors.png"} <= names
     loaded = sp.Result.load(tmp_path / "out" / "run.npz")
-    assert {name: log.values.shape for name, log in loaded.sensors.items()} == {
-        "inside": (26, 6),
-        "touch": (51, 1),
-    }
+    shapes = {name: log.values.shape for name, log in loaded.sensors.items()}
+    assert shapes == {"inside": (26, 6), "touch": (51, 1)}
     assert 0 < loaded.sensors["touch"].values.sum() < 51
     with open(tmp_path / "out" / "sensors.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.reader(file))
@@ -59,9 +57,7 @@ def test_readings_are_figures(tmp_path, no_pictures):
 
 
 def test_a_single_table_will_do(tmp_path):
-    table = (
-        '\n[sensor]\ntype = "contact-switch"\nname = "a"\ncontact = "ball-plate"\nthreshold = 1\n'
-    )
-    built = build(write(tmp_path, DROP + table), {"sensor.threshold": "0.25"})
+    keys = 'type = "contact-switch"\nname = "a"\ncontact = "ball-plate"\nthreshold = 1\n'
+    built = build(write(tmp_path, f"{DROP}\n[sensor]\n{keys}"), {"sensor.threshold": "0.25"})
     assert built.simulation.sensors[0].threshold == 0.25
     assert np.isfinite(built.simulation.sensors[0].rate)

@@ -66,11 +66,7 @@ def test_a_joint_that_turns_without_end_has_an_angle() -> None:
     assert curves["v.wheel"].of(v[None]) == pytest.approx(np.rad2deg(0.1))
     assert curves["v.slide"].of(v[None]) == 200.0
     units = {"q.wheel": "deg", "q.slide": "mm", "q.free.0": "mm", "q.free.6": ""}
-    units |= {
-        "v.free.5": "deg/s",
-        "torque.slide": "N",
-        "torque.wheel": "N m",
-        "torque.free.5": "N m",
-    }
+    units |= {"v.free.5": "deg/s", "torque.slide": "N"}
+    units |= dict.fromkeys(("torque.wheel", "torque.free.5"), "N m")
     assert units == {key: curves[key].unit for key in units}
     assert len([key for key in curves if key.startswith("q.")]) == 9

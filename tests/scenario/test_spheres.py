@@ -45,14 +45,11 @@ def test_an_egg_falls_on_a_plane(tmp_path):
 
 def test_the_table_of_many_contacts_lists_the_largest(tmp_path):
     # 20 spheres of one ball that falls on one of them.
-    spheres = ", ".join(
-        f"{{ frame = 'lower/ball', radius = 0.012, offset = [0, 0, {0.001 * k}] }}"
-        for k in range(20)
-    )
+    one = "{{ frame = 'lower/ball', radius = 0.012, offset = [0, 0, {}] }}"
+    spheres = ", ".join(one.format(0.001 * k) for k in range(20))
     start, end = TWO_BALLS.index("spheres = ["), TWO_BALLS.index('shell = "plate"')
     file = write(tmp_path, f"{TWO_BALLS[:start]}spheres = [{spheres}]\n{TWO_BALLS[end:]}")
-    options = ["run", str(file), "--out", str(tmp_path / "out"), "--no-recording"]
-    told = call(*options).output
+    told = call("run", file, "--out", tmp_path / "out", "--no-recording").output
     assert "floor/lower/ball-0 " in told
     assert "floor/lower/ball-19" not in told
     assert "5 more contacts with smaller peak forces, of which" in told

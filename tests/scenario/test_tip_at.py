@@ -25,12 +25,17 @@ def pose_of(built, frame="link_5"):
     return files.pose_of(built.scene.model, built.q0, frame)
 
 
+def tip_of(built, frame="link_5"):
+    """Return where the center of the contact's sphere is at the start."""
+    return pose_of(built, frame).act(np.array([0, 0, 0.2]))
+
+
 @pytest.mark.parametrize(
     "start", [f"{{ tip_at = {XYZ} }}", f"{{ tip_at = {{ xyz = {XYZ} }}, joint_0 = 0.3 }}"]
 )
 def test_the_sphere_of_the_contact_is_where_it_is_stated(start, tmp_path):
     built = build(scenario(tmp_path, start))
-    np.testing.assert_allclose(pose_of(built).act(np.array([0, 0, 0.2])), XYZ, atol=1e-6)
+    np.testing.assert_allclose(tip_of(built), XYZ, atol=1e-6)
     model = built.scene.model
     assert (built.q0 >= model.lowerPositionLimit).all()
     assert (built.q0 <= model.upperPositionLimit).all()
@@ -49,9 +54,7 @@ def test_stated_joints_are_where_the_search_begins_and_locked_ones_stay(tmp_path
     near = "{ tip_at = [0.4, 0.1, 0.3], joint_0 = 0.5, joint_1 = 0.9, joint_2 = 0.7 }"
     path = scenario(tmp_path, near, 'lock = ["joint_0"]')
     built = build(path)
-    np.testing.assert_allclose(
-        pose_of(built).act(np.array([0, 0, 0.2])), [0.4, 0.1, 0.3], atol=1e-6
-    )
+    np.testing.assert_allclose(tip_of(built), [0.4, 0.1, 0.3], atol=1e-6)
     assert built.assembly.q0[0] == 0.5
 
 
@@ -61,9 +64,7 @@ def test_places_are_those_of_the_world(tmp_path):
     more += "placement = { xyz = [1.0, 0.0, 0.0], rpy_deg = [0.0, 0.0, 90.0] }\n"
     more += "start = { tip_at = { xyz = [0.8, 0.2, 0.3], frame = 'link_5' } }\n"
     built = build(scenario(tmp_path, f"{{ tip_at = {XYZ} }}", more, sphere="one/link_5"))
-    np.testing.assert_allclose(
-        pose_of(built, "one/link_5").act(np.array([0, 0, 0.2])), XYZ, atol=1e-6
-    )
+    np.testing.assert_allclose(tip_of(built, "one/link_5"), XYZ, atol=1e-6)
     np.testing.assert_allclose(pose_of(built, "two/link_5").translation, [0.8, 0.2, 0.3], atol=1e-6)
 
 

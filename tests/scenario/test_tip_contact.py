@@ -5,13 +5,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from sphshell_pin.contact.materials import find_material
+from sphshell_pin.dynamics.scene.models import mass_matrix
 from sphshell_pin.errors import SphshellError
 from sphshell_pin.scenario.drafting.plan import Materials, force_rise, press_force, press_gap
 from sphshell_pin.scenario.running.run import simulate
+from tests.models import jacobian_of
 
 PROBE = Path(__file__).parents[1] / "data" / "robots" / "arm_with_probe.urdf"
 RADIUS = 0.01
@@ -38,12 +39,8 @@ def test_a_tip_that_is_led_is_damped_by_seven_tenths(draft):
     """Of critical, with the geometric mean of its masses along the normal and where it slides."""
     built = draft(PROBE, "plane").built
     control, model, tip = built.controller, built.scene.model, built.scene.pairs[0].spheres[0]
-    frame = model.getFrameId(tip.frame)
-    data = model.createData()
-    jacobian = pin.computeFrameJacobian(model, data, built.q0, frame, pin.LOCAL_WORLD_ALIGNED)
-    arm = data.oMf[frame].rotation @ np.array(tip.sphere.offset)
-    jacobian = jacobian[:3] - pin.skew(arm) @ jacobian[3:]
-    mobility = jacobian @ np.linalg.solve(pin.crba(model, data, built.q0), jacobian.T)
+    jacobian = jacobian_of(model, built.q0, tip.frame, tip.sphere.offset)[:3]
+    mobility = jacobian @ np.linalg.solve(mass_matrix(model, built.q0), jacobian.T)
     slide = np.linalg.eigvalsh(mobility[:2, :2])[-1]
     mass = 1 / np.sqrt(mobility[2, 2] * slide)
     ratio = control.damping / (2 * np.sqrt(control.stiffness * mass))

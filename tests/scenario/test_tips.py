@@ -24,6 +24,7 @@ from sphshell_pin.scenario.drafting.searching import CannotReach
 from sphshell_pin.scenario.drafting.trial import Fault
 from tests import urdf
 from tests.scenario.limbs import ball, limb, link
+from tests.texts import DATA
 from tests.urdf import shape
 
 
@@ -141,9 +142,7 @@ def test_a_drone_touches_with_its_body_or_its_feet(load, feet: int) -> None:
     assert {carrier(robot, one) for one in tips} == {robot.model.names[1]}
 
 
-def test_where_one_limb_does_not_come_to_the_part_another_does(
-    draft, tmp_path: Path, monkeypatch
-) -> None:
+def test_where_one_limb_does_not_come_to_the_part_another_does(draft, tmp_path, monkeypatch):
     """As the thumb of a hand, in whose way its palm may be."""
     file = urdf.write(tmp_path / "body.urdf", body("left", "right"))
     model, tried = robots.load_file(file).model, list[str]()
@@ -211,9 +210,8 @@ def test_of_several_named_tips_the_one_that_stands_free_is_taken(load) -> None:
 
 
 def test_an_end_that_is_a_corner_gets_a_ball(load) -> None:
-    tilted = shape("collision", '<box size=".02 .02 .02"/>', "0 0 .2").replace(
-        'xyz="0 0 .2"', 'xyz="0 0 .2" rpy="0.7854 0.6155 0"'
-    )
+    box = shape("collision", '<box size=".02 .02 .02"/>', "0 0 .2")
+    tilted = box.replace("<origin", '<origin rpy="0.7854 0.6155 0"')
     (tip,) = tips_of(load(link("base", ".1 .1 .1") + limb("arm", "base", "0 0 .1", "", "", tilted)))
     assert 0.001 < tip.radius < 0.02
 
@@ -232,23 +230,15 @@ def test_wheels_beside_an_arm_are_no_tip(load) -> None:
 def test_the_ball_of_a_mechanism_in_a_plane_is_in_that_plane(load) -> None:
     """Also where its last link lies around its hinge."""
     parts = link("base") + limb("cart", "base", "0 0 1", kind="prismatic", axis="1 0 0")
-    parts += limb("body", "cart", "0 0 0", ".2 .1 .2") + limb(
-        "foot", "body", "0 0 -.2", ".3 .1 .06"
-    )
+    parts += limb("body", "cart", "0 0 0", ".2 .1 .2")
+    parts += limb("foot", "body", "0 0 -.2", ".3 .1 .06")
     (tip,) = tips_of(load(parts))
     assert tip.offset == pytest.approx([0.0, 0.0, tip.offset[2]], abs=2e-3)
     assert tip.offset[2] < -0.03
 
 
-def test_a_body_of_an_mjcf_is_no_tool_frame_where_its_joint_is_elsewhere(tmp_path: Path) -> None:
-    file = tmp_path / "leg.xml"
-    file.write_text(
-        '<mujoco><worldbody><body name="leg"><joint axis="0 1 0"/><geom type="capsule" size=".05" '
-        'fromto="0 0 0 0 0 -.4"/><body name="foot" pos="0 0 -.6"><joint axis="0 1 0" pos="0 0 .2"/>'
-        '<geom type="capsule" size=".06" fromto="-.1 0 .2 .2 0 .2"/></body></body></worldbody>'
-        "</mujoco>"
-    )
-    (tip,) = tips_of(robots.load_file(file))
+def test_a_body_of_an_mjcf_is_no_tool_frame_where_its_joint_is_elsewhere() -> None:
+    (tip,) = tips_of(robots.load_file(DATA / "robots" / "leg.xml"))
     assert tip.offset[2] > 0.1
 
 

@@ -109,30 +109,26 @@ def write_step(path: Path, *named: tuple[str, Any], unit: str = "MM", faces: Any
 
 def roof(height: float = 3.0) -> Any:
     """One spline face of 20 by 10 mm with a kink along its middle, `height` above its rims."""
-    poles = Array2_gp_Pnt(1, 5, 1, 2)
-    bend = np.array([0.0, 0.5, 1.0, 0.5, 0.0]) * height
-    for i in range(5):
-        for j in range(2):
-            poles.SetValue(i + 1, j + 1, gp_Pnt(5.0 * i, 10.0 * j, bend[i]))
-    surface = Geom_BSplineSurface(
-        poles,
-        _array(Array1_double, (0.0, 0.5, 1.0)),
-        _array(Array1_double, (0.0, 1.0)),
-        _array(Array1_int, (3, 2, 3)),
-        _array(Array1_int, (2, 2)),
-        2,
-        1,
-    )
+    rise = np.array([0.0, 0.5, 1.0, 0.5, 0.0]) * height
+    poles = _poles([[(5.0 * i, y, rise[i]) for y in (0.0, 10.0)] for i in range(5)])
+    knots = [_array(Array1_double, one) for one in ((0.0, 0.5, 1.0), (0.0, 1.0))]
+    times = [_array(Array1_int, one) for one in ((3, 2, 3), (2, 2))]
+    surface = Geom_BSplineSurface(poles, *knots, *times, 2, 1)
     return BRepBuilderAPI_MakeFace(surface, 1e-7).Face()
 
 
 def patch(corners: Any) -> Any:
     """The bilinear face between corners (2, 2, 3) [mm]."""
-    poles = Array2_gp_Pnt(1, 2, 1, 2)
-    for i in range(2):
-        for j in range(2):
-            poles.SetValue(i + 1, j + 1, gp_Pnt(*corners[i][j]))
-    return BRepBuilderAPI_MakeFace(Geom_BezierSurface(poles), 1e-7).Face()
+    return BRepBuilderAPI_MakeFace(Geom_BezierSurface(_poles(corners)), 1e-7).Face()
+
+
+def _poles(points: Any) -> Any:
+    """Points (n, m, 3) as OpenCASCADE takes them."""
+    rows, columns, _ = np.shape(points)
+    poles = Array2_gp_Pnt(1, rows, 1, columns)
+    for i, j in np.ndindex(rows, columns):
+        poles.SetValue(i + 1, j + 1, gp_Pnt(*map(float, points[i][j])))
+    return poles
 
 
 def _array(kind: Any, values: tuple[float, ...]) -> Any:

@@ -18,6 +18,7 @@ from tests.parts.occ import area_and_volume
 from tests.programs import python
 from tests.shell import cad_shapes as shapes
 from tests.shell.surfaces import expect
+from tests.tables import cases_of
 
 
 def load(tmp_path, shape, **options):
@@ -117,23 +118,9 @@ def test_bodies_and_faces_can_be_chosen_by_name(two):
     assert set(barrel.face_names) == {"barrel"}
 
 
-@pytest.mark.parametrize(
-    ("options", "kind", "told"),
-    [
-        ({"bodies": ["bolt"]}, errors.NameNotFound, r"no body 'bolt'; two\.step has: plate, pin"),
-        (
-            {"bodies": ["pin"], "faces": ["Face 1"]},
-            errors.NameNotFound,
-            "barrel, Face 8, Face 9",
-        ),
-        ({"chord_error": 0.0}, errors.InvalidParameter, "chord_error"),
-        ({"sew": -1.0}, errors.InvalidParameter, "sew"),
-        ({"bodies": "pin"}, errors.InvalidParameter, "bodies"),
-        ({"faces": []}, errors.InvalidParameter, "faces"),
-    ],
-)
+@pytest.mark.parametrize(("options", "kind", "told"), cases_of("shell_files")["options"])
 def test_options_that_cannot_be_are_refused(options, kind, told, two):
-    with pytest.raises(kind, match=told):
+    with pytest.raises(getattr(errors, kind), match=told):
         Shell.from_file(two, **options)
 
 
@@ -202,33 +189,14 @@ def test_damaged_files_are_told_in_a_sentence(suffix, tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-ABSENT = "libGL.so.1: cannot open shared object file: No such file or directory"
-
-
-@pytest.mark.parametrize(
-    ("library", "kind", "told"),
-    [
-        ("", errors.MissingExtra, r"reading .brep files needs .*sphshell-pin\[cad\]"),
-        (
-            f"raise ImportError({ABSENT!r})",
-            errors.UnusableExtra,
-            r"installed but cannot be loaded: .*it needs the library libGL\.so\.1, which is "
-            r"absent; .* install libgl1 libx11-6$",
-        ),
-        (
-            "raise ImportError('GLIBC_2.99 not found')",
-            errors.UnusableExtra,
-            r"installed but cannot be loaded: .*\(GLIBC_2\.99 not found\)",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("library", "kind", "told"), cases_of("shell_files")["libraries"])
 def test_a_library_that_is_absent_is_named(library, kind, told, box, monkeypatch):
     """Processes started from now on find a package of this text in place of OpenCASCADE."""
     package = box.parent / "first" / "OCP"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text(library)
     monkeypatch.setattr(sys, "path", [str(package.parent), *sys.path])
-    with pytest.raises(kind, match=told) as caught:
+    with pytest.raises(getattr(errors, kind), match=told) as caught:
         Shell.from_file(box, "mm")
     assert getattr(caught.value, "reason", "") in library
 

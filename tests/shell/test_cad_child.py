@@ -21,28 +21,14 @@ from sphshell_pin.shell.cad import process
 from sphshell_pin.shell.cad.messages import pack, unpack
 from tests.command import call
 from tests.shell import cad_shapes as shapes
+from tests.tables import cases_of
 
 DAMAGED = sorted((Path(__file__).parents[1] / "data" / "damaged_cad").iterdir())
 
 # It holds the interpreter's lock, as OpenCASCADE does.
 HANG = "re.match('(a+)+$', 'a' * 60 + 'b')"
-MEMORY = r"takes OpenCASCADE more than the memory limit of 0\.2 GB"
-JOBS = {
-    "signal.raise_signal(signal.SIGSEGV)": r"box.brep: makes OpenCASCADE crash \(signal 11, "
-    r"segmentation fault\): the file",
-    "os.write(2, b'free(): invalid pointer'); os.abort()": r"crash \(signal 6, aborted; free\(\): "
-    r"invalid pointer\): the file",
-    HANG: r"takes OpenCASCADE more than the time limit of 1 s: raise time_limit",
-    "return [bytes(10_000_000) for k in range(10_000)]": MEMORY + ": raise memory_limit",
-    "os.write(2, b'terminate called ... std::bad_alloc'); os.abort()": MEMORY,
-    "raise RuntimeError('Standard_NullObject')": r"makes OpenCASCADE fail \(Standard_NullObject\): "
-    "the file is damaged",
-    "os.write(answers, bytes(1000))": "box.brep: gets no valid answer from OpenCASCADE: the file",
-    "os.write(answers, b'\\xff' * 1000)": "box.brep: gets no valid answer from OpenCASCADE",
-}
+JOBS = cases_of("opencascade_jobs")["jobs"]
 """What a child may do in place of reading a file, and what is told of it."""
-
-
 MODULE = """
 import os, re, signal, sys, types
 from sphshell_pin.shell.cad import child
@@ -119,10 +105,8 @@ def listed(*of):
     """Return what ps lists of processes."""
     # Without libraries that sanitizers load first: ps may not end with them.
     bare = {"PATH": os.environ["PATH"]}
-    command = ["ps", "-o", *map(str, of)]
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, env=bare
-    ).stdout.strip()
+    told = subprocess.run(["ps", "-o", *map(str, of)], stdout=-1, text=True, check=False, env=bare)
+    return told.stdout.strip()
 
 
 def wait_for(answer):

@@ -11,6 +11,7 @@ from sphshell_pin import Shell
 from sphshell_pin.errors import InvalidParameter, ShellFileError, UnitMissing, UnitWarning
 from sphshell_pin.shell.converting import convert
 from tests.shell import cad_shapes as shapes
+from tests.tables import cases_of
 
 SIDES = np.array([20.0, 30.0, 10.0])
 """Of the box in the files, as their numbers have it."""
@@ -150,20 +151,7 @@ def with_header(iges, unit, delimiter=",", ends=";"):
     return "\n".join([*found["S"], *header, *found["D"], *data, last, ""])
 
 
-@pytest.mark.parametrize(
-    ("stated", "meters", "called"),
-    [
-        ("2,2HMM", 1e-3, "mm"),
-        ("3,2HMM", 1e-3, "mm"),
-        ("3,1HM", 1.0, "m"),
-        ("3,4HINCH", 0.0254, "in"),
-        ("3,2HFT", 0.3048, "ft"),
-        ("1,2HIN", 0.0254, "in"),
-        ("1,", 0.0254, "in"),
-        ("10,2HCM", 0.01, "cm"),
-        ("11,3HUIN", 2.54e-8, "2.54e-08 m"),
-    ],
-)
+@pytest.mark.parametrize(("stated", "meters", "called"), cases_of("shell_files")["iges_units"])
 def test_iges_units_come_by_flag_or_by_name(stated, meters, called, iges, written):
     check_unit(written(with_header(iges, stated), ".iges"), meters, called)
 

@@ -6,13 +6,14 @@ import pytest
 pytest.importorskip("OCP")
 
 
-from sphshell_pin import Shell
-from sphshell_pin.errors import InvalidParameter, NameNotFound, ShellFileError
+from sphshell_pin import Shell, errors
+from sphshell_pin.errors import NameNotFound, ShellFileError
 from sphshell_pin.shell import converting
 from sphshell_pin.shell.converting import convert
 from tests.command import call, succeed
 from tests.meshes import cube
 from tests.shell import cad_shapes as shapes
+from tests.tables import cases_of
 
 
 @pytest.fixture
@@ -97,21 +98,12 @@ def test_a_failed_conversion_leaves_the_old_file_and_nothing_else(plate, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("source", "target", "options", "kind", "told"),
-    [
-        ("plate.step", "out.xyz", {}, InvalidParameter, "must end in one of"),
-        ("plate.step", "out.step", {}, InvalidParameter, "must end in one of"),
-        ("plate.step", "nowhere/out.stl", {}, ShellFileError, "No such file"),
-        ("plate.step", "out.obj", {"unit_out": "parsec"}, InvalidParameter, "unit"),
-        ("box.stl", "box.stl", {}, InvalidParameter, "another file"),
-        ("box.stl", "a.obj", {"chord_error": 1e-4}, InvalidParameter, "belongs to CAD files"),
-        ("box.stl", "a.obj", {"time_limit": 9}, InvalidParameter, "time_limit = 9 belongs to CAD"),
-    ],
+    ("source", "target", "options", "kind", "told"), cases_of("shell_files")["conversions"]
 )
 def test_what_cannot_be_is_refused(source, target, options, kind, told, plate, tmp_path):
     Shell(*cube()).to_file(tmp_path / "box.stl")
     unit = "mm" if source == "box.stl" else None
-    with pytest.raises(kind, match=told):
+    with pytest.raises(getattr(errors, kind), match=told):
         convert(tmp_path / source, tmp_path / target, unit, **options)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sphshell_pin.shell import Shell
+from tests.tables import cases_of
 
 from .surfaces import DATA, areas, expect, surface_file
 
@@ -15,22 +16,7 @@ FIGURES = (
     *("input_elements", "elements", "boundary_edges", "non_manifold_edges"),
     *("degenerate_elements", "duplicate_elements", "components"),
 )
-FILES = {
-    "bladex_upper.stl": (522, 522, 58, 0, 0, 0, 1),
-    "trimesh_featuretype.STL": (3476, 3476, 0, 0, 0, 0, 1),
-    "c3d_fandisk.obj": (12946, 12946, 0, 0, 0, 0, 1),
-    "c3d_stanford-bunny.obj": (69451, 69451, 223, 0, 0, 0, 1),
-    "fcpw_dragon.obj": (100000, 100000, 0, 0, 0, 0, 1),
-    "libigl_inspired_mesh_quads_Smooth.off": (1838, 3676, 248, 0, 0, 0, 1),
-    "trimesh_quadknot.obj": (1440, 2880, 0, 0, 0, 0, 1),
-    "trimesh_wallhole.obj": (13, 66, 0, 0, 0, 0, 1),
-    "trimesh_joined_tetrahedra.obj": (8, 7, 0, 3, 0, 1, 3),
-    "trimesh_soup.stl": (100, 100, 300, 0, 0, 0, 100),
-    "libigltest_sliver_tet.ply": (4, 4, 0, 0, 0, 0, 1),
-    "manifold_openscad-nonmanifold-crash.obj": (1442, 1438, 2, 18, 1, 3, 5),
-    "cgal_degtri_nullface_bis.off": (9, 3, 3, 0, 6, 0, 1),
-    "cgal_degtri_2dt_1edge_split_twice.off": (6, 6, 4, 0, 2, 0, 1),
-}
+KNOWN = cases_of("corpus")
 
 
 def load(name):
@@ -54,11 +40,11 @@ def test_the_readme_of_the_files_is_true():
     assert sum(p.stat().st_size for p in there) < 4e6
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", KNOWN["figures"])
 def test_what_is_known_of_each_file_is_found(name):
     shell = load(name)
     health = shell.health
-    expect(health, **dict(zip(FIGURES, FILES[name], strict=True)))
+    expect(health, **dict(zip(FIGURES, KNOWN["figures"][name], strict=True)))
     lost = health.welded_vertices + health.unused_vertices
     assert health.vertices + lost == health.input_vertices
     assert health.worst_shape > 1e-12
@@ -73,20 +59,11 @@ def test_what_is_known_of_each_file_is_found(name):
     assert not again.repairs
 
 
-RECOGNIZED = {
-    "trimesh_featuretype.STL": ({"plane": 53, "cylinder": 31}, 3326),
-    "trimesh_wallhole.obj": ({"plane": 13}, 66),
-    "manifold_openscad-nonmanifold-crash.obj": ({"plane": 66}, 574),
-    "trimesh_quadknot.obj": ({}, 0),
-    "c3d_fandisk.obj": ({"plane": 9}, 4275),
-}
-
-
-@pytest.mark.parametrize("name", RECOGNIZED)
+@pytest.mark.parametrize("name", KNOWN["faces"])
 def test_faces_are_recognized_as_before(name):
     shell = load(name)
-    kinds = dict(Counter(face.kind for face in shell.faces))
-    assert (kinds, sum(len(face.elements) for face in shell.faces)) == RECOGNIZED[name]
+    kinds = Counter(face.kind for face in shell.faces)
+    assert [kinds, sum(len(face.elements) for face in shell.faces)] == KNOWN["faces"][name]
 
 
 def test_curved_elements_of_a_part_are_as_near_as_before():
@@ -97,9 +74,7 @@ def test_curved_elements_of_a_part_are_as_near_as_before():
     corners = exact.vertices[exact.triangles[rng.integers(len(exact.triangles), size=20_000)]]
     places = np.einsum("nkx,nk->nx", corners, rng.dirichlet([1, 1, 1], 20_000))
     places = exact.closest_points(places).points
-    curved, flat = (
-        np.abs(shell.closest_points(places, method=method).distances)
-        for method in ("smooth", "facets")
-    )
+    found = (shell.closest_points(places, method=method) for method in ("smooth", "facets"))
+    curved, flat = (np.abs(one.distances) for one in found)
     assert curved.mean() < 0.036 * flat.mean()
     assert curved.max() <= flat.max()

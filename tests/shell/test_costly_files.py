@@ -17,17 +17,14 @@ from .surfaces import TRIANGLE
 from .surfaces import star as star_of
 
 
-def on_circle(radius, angle):
-    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
-
-
 def star(count):
     return star_of(count, np.random.default_rng(count))
 
 
 def gear(count):
     angle = 2 * np.pi * np.arange(count) / count
-    return on_circle(1 + 0.3 * np.cos(angle * count / 4), angle)
+    radius = 1 + 0.3 * np.cos(angle * count / 4)
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
 
 def comb(count):

@@ -147,12 +147,10 @@ def test_words():
 
 def test_faces_that_are_not_exact_are_all_named_with_what_they_cost():
     count, base = 9, coal.Cylinder(0.006, 0.03)
-    some = [face for face in mesh(base).faces for _ in range(3)]
-    reasons = ["a vertex is off it by 77 nm", "its border is off it by 0.8 nm"]
-    faces = [
-        replace(face, curved=face.elements, reason=reasons[k % 2], name=f"Face {k}")
-        for k, face in enumerate(some)
-    ]
+    reasons, faces = ["a vertex is off it by 77 nm", "its border is off it by 0.8 nm"], []
+    for k, face in enumerate(face for face in mesh(base).faces for _ in range(3)):
+        more = {"reason": reasons[k % 2], "name": f"Face {k}"}
+        faces.append(replace(face, curved=face.elements, **more))
     told = not_exact(faces, np.full(count, 0.1), 1e-9 * np.arange(count))
     assert len(told) == 2
     assert told[0].startswith("vertex off by 77 to 77 nm: 50 % of the area; elements stand off by")

@@ -34,13 +34,12 @@ def without_display() -> list[str]:
     return hidden
 
 
+def call(*command: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
+
+
 def test_a_step_file_is_read_without_them(without_display: list[str]) -> None:
-    read = subprocess.run(
-        [*without_display, sys.executable, "-c", READ, VALVE_BODY],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    read = call(*without_display, sys.executable, "-c", READ, VALVE_BODY)
     assert (read.returncode, read.stdout, read.stderr) == (0, "27\n", "")
 
 
@@ -48,7 +47,7 @@ def test_the_demo_runs_without_them(without_display: list[str], tmp_path: Path) 
     """What `make demo` runs when it has built; the job demo of CI builds too."""
     program = Path(sys.executable).with_name("sphshell-pin")
     run = [program, "run", "fingertip_on_blade", "--out", tmp_path / "r"]
-    done = subprocess.run([*without_display, *run], capture_output=True, text=True, check=False)
+    done = call(*without_display, *run)
     assert done.returncode == 0, done.stderr
     assert "as expected" in done.stdout
     assert "missed" not in done.stdout

@@ -7,17 +7,8 @@ from hypothesis import strategies as st
 
 from sphshell_pin.shell import clean
 
-from .surfaces import (
-    CUBE,
-    CUBE_QUADS,
-    areas,
-    by_place,
-    expect,
-    joined,
-    plate,
-    signed_volume,
-    tetrahedron,
-)
+from . import surfaces
+from .surfaces import CUBE, CUBE_QUADS, expect, joined, plate
 
 
 @given(st.lists(st.booleans(), min_size=6, max_size=6))
@@ -25,7 +16,7 @@ from .surfaces import (
 def test_any_winding_of_a_cube_ends_outward(turned):
     quads = [q[::-1] if flip else q for q, flip in zip(CUBE_QUADS, turned, strict=True)]
     surface = clean(CUBE, quads)
-    assert signed_volume(surface) == pytest.approx(1.0)
+    assert surfaces.signed_volume(surface) == pytest.approx(1.0)
     flipped, reversed_ = sum(turned), int(all(turned))
     expect(surface.health, flipped_elements=flipped, reversed_components=reversed_, volume=1.0)
 
@@ -34,10 +25,10 @@ def test_an_open_sheet_keeps_the_winding_of_most_of_its_area():
     vertices, quads = plate(3)
     quads[4] = quads[4][::-1]
     surface = clean(vertices, quads)
-    assert (areas(surface)[:, 2] > 0).all()
+    assert (surfaces.areas(surface)[:, 2] > 0).all()
     assert surface.health.flipped_elements == 1
     surface = clean(vertices, quads[:, ::-1])
-    assert (areas(surface)[:, 2] < 0).all()
+    assert (surfaces.areas(surface)[:, 2] < 0).all()
     assert surface.health.ok
 
 
@@ -47,7 +38,7 @@ def test_nested_components_alternate():
     beside = (CUBE + np.array([3.0, 0, 0]), CUBE_QUADS)
     surface = clean(*joined((CUBE, CUBE_QUADS), inner, middle, beside))
     volume = 1 - 0.6**3 + 0.2**3 + 1
-    assert signed_volume(surface) == pytest.approx(volume)
+    assert surfaces.signed_volume(surface) == pytest.approx(volume)
     expect(surface.health, "cavity", cavities=1, closed_components=4, volume=volume)
 
 
@@ -97,21 +88,21 @@ def test_the_outcome_does_not_depend_on_any_order(random, seed):
     place = np.argsort(numbers)
     turned = [np.roll(place[polygons[k]], random.randrange(4)).tolist() for k in order]
     one, two = clean(vertices, polygons), clean(vertices[numbers], turned)
-    assert by_place(one, wound=False) == by_place(two, wound=False)
+    assert surfaces.by_place(one, wound=False) == surfaces.by_place(two, wound=False)
     names = "welded_vertices duplicate_elements edges boundary_edges non_manifold_edges "
     names += "components closed_components volume holes"
     expect(one.health, **{name: getattr(two.health, name) for name in names.split()})
 
 
 def test_normals_follow_the_winding():
-    vertices, triangles = tetrahedron()
-    flat = areas(clean(vertices, triangles))
+    vertices, triangles = surfaces.tetrahedron()
+    flat = surfaces.areas(clean(vertices, triangles))
     flat /= np.linalg.norm(flat, axis=1, keepdims=True)
     corner = np.repeat(flat[:, None, :], 3, axis=1)
     corner[2] *= -1.0
     surface = clean(vertices, np.concatenate([triangles[:2], triangles[2:, ::-1]]), corner)
     expect(surface.health, flipped_elements=2, turned_normals=3, opposing_normals=0)
-    own = areas(surface) / np.linalg.norm(areas(surface), axis=1, keepdims=True)
+    own = surfaces.areas(surface) / np.linalg.norm(surfaces.areas(surface), axis=1, keepdims=True)
     assert surface.normals == pytest.approx(np.repeat(own[:, None, :], 3, axis=1))
 
 

@@ -138,10 +138,8 @@ def test_convex():
     expect(shell.health, is_closed=True, volume=1 / 6)
 
 
-def swollen():
-    box = coal.Box(1.0, 1.0, 1.0)
-    box.setSweptSphereRadius(0.1)
-    return box
+SWOLLEN = coal.Box(1.0, 1.0, 1.0)
+SWOLLEN.setSweptSphereRadius(0.1)
 
 
 def test_geometry_object_gives_name_and_own_frame():
@@ -175,7 +173,7 @@ def test_mesh_scale_of_a_urdf_is_applied_once(tmp_path):
         (coal.Sphere(1.0), {"chord_error": np.nan}, "chord_error"),
         (coal.Sphere(1.0), {"segments": 2}, "segments"),
         (coal.Halfspace(np.array([0, 0, 1.0]), 0.0), {"extent": -1.0}, "extent"),
-        (swollen(), {}, "swept-sphere"),
+        (SWOLLEN, {}, "swept-sphere"),
     ],
 )
 def test_faults(shape, options, said):

@@ -15,13 +15,8 @@ from tests.contact.helpers import force_sum
 from .surfaces import CUBE, CUBE_QUADS, expect, joined, plate
 
 ARRAYS = [
-    "vertices",
-    "elements",
-    "triangles",
-    "triangle_element",
-    "source_element",
-    "box",
-    "normals",
+    *("vertices", "elements", "triangles", "triangle_element", "source_element"),
+    *("box", "normals"),
 ]
 
 

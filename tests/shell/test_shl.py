@@ -5,6 +5,7 @@ import pytest
 
 from sphshell_pin.errors import InvalidParameter, InvalidShell, ShellFileError
 from sphshell_pin.shell import Shell
+from tests.tables import cases_of
 
 from .surfaces import CUBE, CUBE_QUADS, areas, expect
 
@@ -85,25 +86,7 @@ def test_polygons_may_have_many_corners(write):
     assert Shell.from_file(write(lines)).health.elements == 13
 
 
-def test_a_wrong_corner_count_shows_as_a_hole(write):
-    polygons = [*INWARD[:5], "3 " + " ".join(INWARD[5].split()[2:])]
-    health = Shell.from_file(write(version_1(polygons=polygons))).health
-    expect(health, "wrong number of corners", ok=False, boundary_edges=3)
-
-
-@pytest.mark.parametrize(
-    ("options", "size", "word"),
-    [
-        ({}, 0.0254, "applied"),
-        ({"scale": "apply"}, 0.0254, "applied"),
-        ({"scale": "ignore"}, 1.0, "ignored"),
-        ({"scale": 2.0}, 2.0, "in place of"),
-        ({"unit": "mm"}, 1e-3, "ignored"),
-        ({"unit": "mm", "scale": "apply"}, 0.0254e-3, "applied"),
-        ({"unit": "mm", "scale": 3}, 3e-3, "in place of"),
-        ({"unit": "in", "scale": "ignore"}, 0.0254, "ignored"),
-    ],
-)
+@pytest.mark.parametrize(("options", "size", "word"), cases_of("shell_files")["scales"])
 def test_scale(write, options, size, word):
     shell = Shell.from_file(write(version_1("0.025400")), **options)
     assert shell.size == pytest.approx(size * np.sqrt(3.0))
@@ -128,25 +111,14 @@ def test_truncated_anywhere_is_said(write, lines):
             assert caught.value.line is None or 1 <= caught.value.line <= len(some)
 
 
+WRONG = cases_of("wrong_shl")["lines"]
 FLAT = version_1("1", ["0 0 0", "1 0 0", "2 0 0"], ["3 1 2 3"])
 
 
 @pytest.mark.parametrize(
     ("lines", "line", "said"),
     [
-        ({9: "4 1 3 9 2"}, 10, r"point 9\b.*1 to 8"),
-        ({9: "4 1 3 0 2"}, 10, "point 0"),
-        ({9: "2 1 3"}, 10, "2 corners"),
-        ({9: "3 1 3 4 2"}, 10, "4 indices follow"),
-        ({9: "4 1 3.5 4 2"}, 10, "whole numbers"),
-        ({4: "1.0 2.0"}, 5, "line 5"),
-        ({4: "1.0 2.0 nan"}, None, "vertex 4 is not finite"),
-        ({4: "1.0 2.0e 3"}, 5, "line 5"),
-        ({0: "8 6 -1.0"}, 1, "SCALE"),
-        ({0: "8 6"}, 1, "header"),
-        ({0: "8.5 6 1"}, 1, "whole number"),
-        ({0: "Version: 3"}, 1, "version 3"),
-        ({0: "8 0 1.0"}, 1, "no surface"),
+        *(({row: text}, line or None, said) for row, text, line, said in WRONG),
         (["solid cube"], None, "no numbers"),
         (FLAT, None, "no element is left"),
     ],

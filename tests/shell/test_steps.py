@@ -114,9 +114,8 @@ def test_a_band_beyond_whose_end_the_face_goes_on_is_no_plane():
     rows = [(z, turn) for z in (0.0, LENGTH)] + [(z, edge) for z in (0.3 * LENGTH, 0.7 * LENGTH)]
     points = np.concatenate([np.c_[arc(angles), 0 * angles + z] for z, angles in rows])
     n = len(turn)
-    triangles = [
-        (i, *pair) for i in range(n - 1) for pair in ((i + 1, n + i + 1), (n + i + 1, n + i))
-    ]
+    i = np.arange(n - 1)
+    triangles = [*np.c_[i, i + 1, n + i + 1].tolist(), *np.c_[i, n + i + 1, n + i].tolist()]
     # On both sides of the slot, and beyond its ends.
     low, high = 2 * n, 2 * n + 2
     triangles += [(n - 1, low, 2 * n - 1), (low, high, 2 * n - 1)]

@@ -49,11 +49,8 @@ def one_set(path: Path, number: int) -> tuple[Array, Array, Array, int]:
         data[f"{name} [{unit}]"] = columns[name] + noise
     start = {key: repr(value * rng.uniform(0.7, 1.3)) for key, value in TRUTH.items()}
     found = fit(path, data, list(TRUTH), changes=start)
-    values, low, high = (
-        np.array([getattr(one, part) for one in found.parameters])
-        for part in ("value", "low", "high")
-    )
-    return values, low, high, found.runs
+    ends = [(one.value, one.low, one.high) for one in found.parameters]
+    return *np.transpose(ends), found.runs
 
 
 def many_sets(count, first=0, workers=2):

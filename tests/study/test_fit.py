@@ -18,6 +18,7 @@ from sphshell_pin.study.fit.report import patterned
 from sphshell_pin.study.fit.search import covariance_of
 from sphshell_pin.study.quantities import quantities_of, row_step
 from tests.study.fitted_sets import SCENARIO, TRUTH, many_sets
+from tests.tables import cases_of
 
 STIFFNESS, DISSIPATION, FRICTION = TRUTH
 HEIGHT = "q.root_joint.2"
@@ -28,9 +29,8 @@ FORCE = "pairs.tip.normal_force"
 def columns_of(path, t, names, changes=None):
     """Run the scenario; return quantities at the times."""
     built = build(path, changes)
-    result = built.simulation.run(
-        built.q0, built.v0, float(t[-1]), built.controller, record_dt=row_step(t)
-    )
+    start = built.q0, built.v0, float(t[-1]), built.controller
+    result = built.simulation.run(*start, record_dt=row_step(t))
     known = quantities_of(result, built.scene, t, names)
     return {f"{name} [{unit}]": values for name, (unit, values) in known.items()}
 
@@ -43,34 +43,35 @@ def noisy(columns, share, seed=0):
     }
 
 
-def test_a_straight_line_has_its_closed_form(bounce):
-    """z = z0 + v0 t - g t^2 / 2 is linear in g: value and interval are those of regression."""
+def measured(path, t, names, share=0.02, changes=None):
+    """Return noisy data of a run of the scenario."""
+    return {"t [s]": t, **noisy(columns_of(path, t, names, changes), share)}
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_a_straight_line_has_its_closed_form(bounce, given):
+    """z = z0 + v0 t - g t^2 / 2 is linear in g: value and interval are those of regression.
+
+    With given deviations, of which half are ten times as small, they are those of weighted
+    regression.
+    """
     t = np.linspace(0.0, 0.005, 41)
-    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + 1e-4 * np.random.default_rng(3).normal(size=41)
-    found = sp.fit(bounce, {"t [s]": t, f"{HEIGHT} [m]": z}, ["gravity.2"])
-    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
+    sigma = np.where(given & (np.arange(41) % 2 == 1), 1e-5, 1e-4)
+    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + sigma * np.random.default_rng(3).normal(size=41)
+    data = {"t [s]": t, f"{HEIGHT} [m]": z}
+    data |= {f"{HEIGHT}.sigma [mm]": 1e3 * sigma} if given else {}
+    found = sp.fit(bounce, data, ["gravity.2"])
+    slope, y = 0.5 * t**2 / sigma, (z - 0.017 + 0.5 * t) / sigma
     value = slope @ y / (slope @ slope)
-    sigma = math.sqrt(np.sum((y - value * slope) ** 2) / 40)
-    half = stats.t.ppf(0.975, 40) * sigma / math.sqrt(slope @ slope)
+    spread = 1.0 if given else math.sqrt(np.sum((y - value * slope) ** 2) / 40)
+    half = stats.t.ppf(0.975, 40) * spread / math.sqrt(slope @ slope)
     one = found["gravity.2"]
     assert found.dof == 40
     assert one.value == pytest.approx(value, rel=1e-6)
     assert (one.low, one.high) == pytest.approx((value - half, value + half), rel=1e-5)
-    assert found.series[0].rms == pytest.approx(sigma * math.sqrt(40 / 41), rel=1e-6)
-
-
-def test_given_deviations_weight_the_data(bounce):
-    """Half of the rows are ten times as exact; the closed form is that of weighted regression."""
-    t = np.linspace(0.0, 0.005, 41)
-    sigma = np.where(np.arange(41) % 2, 1e-5, 1e-4)
-    z = 0.017 - 0.5 * t - 0.5 * 9.81 * t**2 + sigma * np.random.default_rng(4).normal(size=41)
-    data = {"t [s]": t, f"{HEIGHT} [m]": z, f"{HEIGHT}.sigma [mm]": 1e3 * sigma}
-    one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
-    slope, y = 0.5 * t**2, z - 0.017 + 0.5 * t
-    information = np.sum((slope / sigma) ** 2)
-    assert one.value == pytest.approx(np.sum(slope * y / sigma**2) / information, rel=1e-6)
-    half = stats.t.ppf(0.975, 40) / math.sqrt(information)
-    assert one.high - one.value == pytest.approx(half, rel=1e-4)
+    if not given:
+        rms = spread * sigma[0] * math.sqrt(40 / 41)
+        assert found.series[0].rms == pytest.approx(rms, rel=1e-6)
 
 
 def test_the_noise_of_each_column_is_its_own(bounce):
@@ -84,9 +85,8 @@ def test_the_noise_of_each_column_is_its_own(bounce):
         for name, unit in ((HEIGHT, "m"), (SPEED, "m/s"))
     }
     one = sp.fit(bounce, data, ["gravity.2"])["gravity.2"]
-    half = stats.t.ppf(0.975, 81) / math.sqrt(
-        sum(np.sum((slopes[name] / noise[name]) ** 2) for name in slopes)
-    )
+    information = sum(np.sum((slopes[name] / noise[name]) ** 2) for name in slopes)
+    half = stats.t.ppf(0.975, 81) / math.sqrt(information)
     assert one.high - one.value == pytest.approx(half, rel=0.25)
 
 
@@ -94,10 +94,8 @@ def test_exact_data_give_back_the_values(bounce):
     t = np.linspace(0.0, 0.12, 301)
     data = {"t [s]": t, **columns_of(bounce, t, [FORCE, "pairs.tip.force_x"])}
     start = {STIFFNESS: 7e4, DISSIPATION: 0.4, FRICTION: 0.15}
-    counts = []
-    found = sp.fit(
-        bounce, data, list(TRUTH), changes=start, progress=lambda runs, misfit: counts.append(runs)
-    )
+    more, counts = {"changes": start, "progress": lambda runs, _: counts.append(runs)}, []
+    found = sp.fit(bounce, data, list(TRUTH), **more)
     assert found.converged
     assert list(found.values.values()) == pytest.approx(list(TRUTH.values()), rel=1e-4)
     assert counts == list(range(1, found.runs + 1))
@@ -139,8 +137,7 @@ def test_noise_has_a_pattern_in_one_of_a_hundred_fits():
 
 def test_what_a_fit_does_not_explain_is_said(bounce):
     """A linear spring in place of Hertz's: pulses of another shape."""
-    t = np.linspace(0.0, 0.2, 401)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 401), [FORCE])
     linear = {"contact.tip.law.exponent": 1.0, STIFFNESS: 1e4}
     found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes=linear)
     assert any(one.startswith(f"the fit does not explain {FORCE} of") for one in found.remarks)
@@ -155,8 +152,7 @@ REST = {
 
 @pytest.mark.parametrize("name", [FORCE, "pairs.tip.depth"])
 def test_damping_cannot_be_seen_at_rest(bounce, name):
-    t = np.linspace(0.01, 0.2, 191)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [name], REST), 0.02)}
+    data = measured(bounce, np.linspace(0.01, 0.2, 191), [name], changes=REST)
     found = sp.fit(bounce, data, [STIFFNESS, DISSIPATION], changes=REST)
     assert not found[DISSIPATION].determined
     begin = f"the data do not determine {DISSIPATION}: "
@@ -165,8 +161,7 @@ def test_damping_cannot_be_seen_at_rest(bounce, name):
 
 
 def test_what_no_column_feels_is_said(bounce):
-    t = np.linspace(0.0, 0.2, 101)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 101), [FORCE])
     found = sp.fit(bounce, data, [STIFFNESS, FRICTION])
     assert found[STIFFNESS].determined
     assert not found[FRICTION].determined
@@ -178,13 +173,11 @@ def test_what_no_column_feels_is_said(bounce):
 
 def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
     """Hertz's law has both moduli in 1/E* = (1 - nu^2) (1 / E1 + 1 / E2) alone."""
+    stated = '{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }'
     law = '{ type = "hertz", young = 1e6, poisson = 0.4, young_2 = 2e6, poisson_2 = 0.4 }'
     path = tmp_path / "two.toml"
-    path.write_text(
-        SCENARIO.replace('{ type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }', law)
-    )
-    t = np.linspace(0.0, 0.1, 101)
-    data = {"t [s]": t, **noisy(columns_of(path, t, [FORCE]), 0.01)}
+    path.write_text(SCENARIO.replace(stated, law))
+    data = measured(path, np.linspace(0.0, 0.1, 101), [FORCE], 0.01)
     keys = ["contact.tip.law.young", "contact.tip.law.young_2"]
     found = sp.fit(path, data, keys)
     assert not found.determined
@@ -195,8 +188,7 @@ def test_two_that_act_as_one_are_named_together(bounce, tmp_path):
 
 
 def test_a_value_at_its_bound_is_said(bounce):
-    t = np.linspace(0.0, 0.2, 401)
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE]), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.2, 401), [FORCE])
     wanted = {STIFFNESS: None, DISSIPATION: (0.35, 0.6)}
     found = sp.fit(bounce, data, wanted, changes={DISSIPATION: 0.4})
     assert found[DISSIPATION].at_bound
@@ -205,14 +197,11 @@ def test_a_value_at_its_bound_is_said(bounce):
 
 
 def test_wrong_deviations_are_said(bounce):
-    t = np.linspace(0.0, 0.1, 201)
-    columns = noisy(columns_of(bounce, t, [FORCE]), 0.02)
-    largest = float(np.max(next(iter(columns.values()))))
-    data = {"t [s]": t, **columns}
+    data = measured(bounce, np.linspace(0.0, 0.1, 201), [FORCE])
 
     def remarks(share):
-        sigma = {f"{FORCE}.sigma [N]": np.full(len(t), share * largest)}
-        return sp.fit(bounce, {**data, **sigma}, [STIFFNESS]).remarks
+        sigma = {f"{FORCE}.sigma [N]": np.full(201, share * data[f"{FORCE} [N]"].max())}
+        return sp.fit(bounce, data | sigma, [STIFFNESS]).remarks
 
     assert not remarks(0.02)
     (remark,) = remarks(0.01)
@@ -239,9 +228,8 @@ def test_experiments_of_their_own_settings_are_fitted_together(bounce):
 
 def test_keys_with_one_value(bounce):
     both = "contact.tip.friction.mu_static+contact.tip.friction.mu_dynamic"
-    t = np.linspace(0.0, 0.1, 201)
     same = {"contact.tip.friction.mu_static": "0.2"}
-    data = {"t [s]": t, **noisy(columns_of(bounce, t, ["pairs.tip.force_x"], same), 0.02)}
+    data = measured(bounce, np.linspace(0.0, 0.1, 201), ["pairs.tip.force_x"], changes=same)
     changes = dict.fromkeys(both.split("+"), 0.1)
     found = sp.fit(bounce, data, [both], changes=changes)
     assert found[both].value == pytest.approx(0.2, rel=0.02)
@@ -252,13 +240,9 @@ def test_keys_with_one_value(bounce):
 
 def test_a_sensor_is_read_as_it_logs(bounce, tmp_path):
     """Its readings are those of the file sensors.csv; its noise is that of the data alone."""
-    text = SCENARIO.replace(
-        "[run]",
-        '[[sensor]]\ntype = "force-torque"\nname = "wrist"\nframe = "ball"\nrate = 2000.0\n'
-        "delay = 0.001\nforce_noise = 0.3\n\n[run]",
-    )
+    sensor = '[[sensor]]\ntype = "force-torque"\nname = "wrist"\nframe = "ball"\nrate = 2000.0\n'
     path = tmp_path / "sensed.toml"
-    path.write_text(text)
+    path.write_text(f"{SCENARIO}\n{sensor}delay = 0.001\nforce_noise = 0.3\n")
     built = build(path)
     result = built.simulation.run(built.q0, built.v0, 0.1, record_dt=1e-3)
     data = result.sensor_columns()
@@ -342,21 +326,7 @@ def test_rows_lie_at_the_times_of_the_data(t, step):
     assert row_step(np.array(t)) == pytest.approx(step, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("wanted", "said"),
-    [
-        ([], "parameters"),
-        (["contact.tip.law.stifness"], "did you mean 'stiffness'"),
-        (["run.rtol"], "no property of what was measured"),
-        (["contact.tip.law.type"], "is not a number"),
-        (["robot.ball.start.root_joint.0"], "must not start at 0"),
-        ([STIFFNESS, "contact.law.stiffness"], "given twice"),
-        ({STIFFNESS: (1.0, 2.0)}, "must start within its range"),
-        ({STIFFNESS: (2.0, 1.0)}, "must be a range"),
-        ({STIFFNESS: (-1.0, 1e9)}, "must be positive"),
-        ([f"{STIFFNESS}+{DISSIPATION}"], "must have one unit"),
-    ],
-)
+@pytest.mark.parametrize(("wanted", "said"), cases_of("wrong_fits")["parameters"])
 def test_a_wrong_parameter_gets_a_sentence(bounce, wanted, said):
     data = {"t [s]": [0.0, 0.1], f"{HEIGHT} [m]": [0.0, 0.1]}
     with pytest.raises((ScenarioError, InvalidParameter), match=said):

@@ -13,8 +13,9 @@ import sphshell_pin as sp
 from sphshell_pin.base.tables import csv_text
 from sphshell_pin.scenario import read_scenario
 from tests.command import call, succeed
+from tests.study import test_fit
 from tests.study.fitted_sets import SCENARIO
-from tests.study.test_fit import DISSIPATION, FORCE, FRICTION, HEIGHT, STIFFNESS, columns_of, noisy
+from tests.study.test_fit import DISSIPATION, FORCE, FRICTION, HEIGHT, STIFFNESS, measured
 
 
 def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
@@ -22,8 +23,7 @@ def test_the_command_writes_values_in_place(bounce, tmp_path, monkeypatch):
     t = np.linspace(0.0, 0.1, 201)
     fast = "robot.ball.speed.root_joint=[0.0,0.0,-1.0,0.0,0.0,0.0]"
     for name, changes in (("drop.csv", {}), ("fast.csv", dict([fast.split("=")]))):
-        data = {"t [s]": t, **noisy(columns_of(bounce, t, [FORCE], changes), 0.02)}
-        Path(name).write_text(csv_text(data))
+        Path(name).write_text(csv_text(measured(bounce, t, [FORCE], changes=changes)))
     command = ["fit", "drop.csv", bounce, f"--param={STIFFNESS}", f"--param={DISSIPATION}=0:1"]
     command += ["--experiment", f"fast.csv {fast}", "--set", f"{STIFFNESS}=8e4"]
     done = succeed(*command)
@@ -56,7 +56,7 @@ def test_what_is_not_told_from_0_is_a_result_like_others(bounce):
     """Its types are those of JSON."""
     # The ball's place along x is measured to 40 mm, of which friction does less in 0.05 s.
     t = np.linspace(0.0, 0.05, 201)
-    (x,) = columns_of(bounce, t, ["q.root_joint.0"]).values()
+    (x,) = test_fit.columns_of(bounce, t, ["q.root_joint.0"]).values()
     x = x + 0.04 * np.random.default_rng(3).normal(size=201)
     found = sp.fit(bounce, {"t [s]": t, "q.root_joint.0 [m]": x}, [FRICTION])
     assert any("leaves its order of magnitude open" in one for one in found.remarks)

@@ -16,6 +16,7 @@ from sphshell_pin.study.fit.units import factor_to_si
 from sphshell_pin.study.fit.writing import scenario_text
 from tests.command import refused
 from tests.study.fitted_sets import SCENARIO
+from tests.tables import cases_of
 
 HEIGHT = "q.root_joint.2"
 HEAD = f"t [s],{HEIGHT} [m]\n"
@@ -39,9 +40,8 @@ def read(built, tmp_path):
             path = tmp_path / "data.csv"
             path.write_bytes(data if isinstance(data, bytes) else data.encode())
             data = path
-        return read_experiment(
-            sp.Experiment(data), 1, known, built.scenario.run.duration, **options
-        )
+        duration = built.scenario.run.duration
+        return read_experiment(sp.Experiment(data), 1, known, duration, **options)
 
     return read_data
 
@@ -71,39 +71,9 @@ def test_columns_may_be_chosen(read):
         read(text, only=["depth"])
 
 
-WRONG = {
-    "empty": ("", "is empty"),
-    "comments alone": ("# a\n\n,,\n", "is empty"),
-    "a header alone": (HEAD, "has no rows of data"),
-    "no header": ("0,1\n1,2\n", "line 1: the first line must be a header"),
-    "no time": (f"{HEIGHT} [m]\n1\n", r"has no column 't \[s\]'; its columns are: q\.root_joint"),
-    "time alone": ("t [s]\n0\n0.1\n", "has no column of data"),
-    "no unit": (f"t [s],{HEIGHT}\n0,1\n", rf"needs its unit in the header: '{HEIGHT} \[m\]'"),
-    "no unit of time": (f"t,{HEIGHT} [m]\n0,1\n", r"'t' needs its unit .*'t \[s\]'"),
-    "unit of another kind": (f"t [s],{HEIGHT} [N]\n0,1\n", r"in \[N\] must be in one of: m, "),
-    "unknown unit of time": (f"t [h],{HEIGHT} [m]\n0,1\n", "must be in one of: s, ms, us"),
-    "unknown column": ("t [s],force [N]\n0,1\n", "no quantity 'force'; the nearest are pairs.tip"),
-    "two of one name": (f"t [s],{HEIGHT} [m],{HEIGHT} [m]\n0,1,1\n", "two columns are called"),
-    "the same in two units": (f"t [s],{HEIGHT} [m],{HEIGHT} [mm]\n0,1,1\n", "two columns are"),
-    "backwards": (HEAD + "0,1\n0.2,1\n\n0.1,1\n", "line 5: time 0.1 s is before that of the row"),
-    "twice": (HEAD + "0,1\n0.2,1\n0.2,1\n", "line 4: time 0.2 s is the same as that of the row"),
-    "time nan": (HEAD + "0,1\nnan,1\n", "line 3: 'nan' in column 't .s.' is not a finite number$"),
-    "time missing": (HEAD + "0,1\n,1\n", "line 3: the time is missing"),
-    "value nan": (HEAD + "0,1\n0.1,nan\n", "line 3: 'nan' .* leave the cell empty where"),
-    "underscore": (HEAD + "0,1\n0.1,1_0\n", "line 3: '1_0' in column .* is not a finite number"),
-    "a word": (HEAD + "0,1\n0.1,high\n", "line 3: 'high' in column .* is not a finite number"),
-    "semicolons": ("t [s];x [m]\n0;1,5\n", "line 1: columns must be separated by commas"),
-    "decimal commas": (HEAD + "0,06,1\n", "line 2: has 3 values, the header has 2 columns"),
-    "a short row": (HEAD + "0,1\n0.1\n", "line 3: has 1 values"),
-    "after the run": (HEAD + "0,1\n9,1\n", "line 3: time 9 s is after the end of the run, 0.25 s"),
-    "before the run": (HEAD + "-1,1\n0,1\n", "line 2: time -1 s is before the start"),
-    "no value": (HEAD + "0,\n0.1,\n", f"column '{HEIGHT}' has no value"),
-    "sigma 0": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,0\n", "line 2: .* must be positive"),
-    "sigma missing": (f"t [s],{HEIGHT} [m],{HEIGHT}.sigma [m]\n0,1,\n", "must be positive"),
-    "sigma of nothing": (f"t [s],{HEIGHT} [m],v.a.sigma [m]\n0,1,1\n", "has no column 'v.a' to"),
-    "not UTF-8": (HEAD.encode() + b"0,\xff\n", "is not a text file in UTF-8"),
-    "an open quote": ('"t [s],x [m]\n0,1\n', "is not a csv file"),
-}
+TABLES = cases_of("wrong_measurements")
+WRONG = TABLES["files"]
+WRONG["not UTF-8"] = HEAD.encode() + b"0,\xff\n", "is not a text file in UTF-8"
 
 
 @pytest.mark.parametrize("case", WRONG)
@@ -115,25 +85,7 @@ def test_wrong_data_get_a_sentence(read, case):
     assert str(caught.value).startswith(str(caught.value.path))
 
 
-@pytest.mark.parametrize(
-    ("columns", "said"),
-    [
-        ({"t [s]": [0.0, 1.0], f"{HEIGHT} [m]": [0.0]}, "must be of one length"),
-        ({"t [s]": [0.0, 0.0], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: time 0 s is the same"),
-        ({"t [s]": [0.0, math.nan], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: the time is missing"),
-        ({"t [s]": ["a"], f"{HEIGHT} [m]": [0.0]}, "columns of numbers"),
-        ({"t [s]": [0.0, math.inf], f"{HEIGHT} [m]": [0.0, 1.0]}, "row 1: 'inf' in .*number$"),
-        (
-            {"t [s]": [0.0, 0.1], f"{HEIGHT} [mm]": [-math.inf, 1.0]},
-            rf"row 0: '-inf' in column '{HEIGHT} \[mm\]' is not a finite number; put nan where",
-        ),
-        (
-            {"t [s]": [0.0], f"{HEIGHT} [m]": [0.0], f"{HEIGHT}.sigma [m]": [math.inf]},
-            rf"row 0: 'inf' in column '{HEIGHT}.sigma \[m\]' is not a finite number",
-        ),
-        (7, "must be a csv file, or a mapping"),
-    ],
-)
+@pytest.mark.parametrize(("columns", "said"), TABLES["columns"]["rows"])
 def test_wrong_columns_get_a_sentence(read, columns, said):
     with pytest.raises(DataError, match=said):
         read(columns)
@@ -195,22 +147,20 @@ def test_units(given, unit, factor):
     assert factor_to_si("x", given, unit) == pytest.approx(factor)
 
 
+LAW = 'law = { type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }'
+
+
 def test_values_are_written_in_place_whatever_the_form(tmp_path):
     """Inline tables, tables, dotted keys, lists, keys that are not there, names of files."""
     folder = tmp_path / "here"
     (folder / "parts").mkdir(parents=True)
     (folder / "parts" / "plate.stl").write_text("")
     source = folder / "a.toml"
-    text = SCENARIO.replace(
-        'primitive = { type = "half-space", extent = 2.0 }',
-        'file = "parts/plate.stl"  # 0.3\nunit = "mm"',
-    )
-    assert text != SCENARIO
-    text = text.replace(
-        'law = { type = "hunt-crossley", stiffness = 1e5, dissipation = 0.3 }',
-        'law.type = "hunt-crossley"\nlaw.stiffness = 1e5  # 1e5\nlaw.dissipation = 0.3',
-    )
-    source.write_text(text)
+    plate, law = 'primitive = { type = "half-space", extent = 2.0 }', LAW
+    assert SCENARIO.count(plate) == SCENARIO.count(law) == 1
+    text = SCENARIO.replace(plate, 'file = "parts/plate.stl"  # 0.3\nunit = "mm"')
+    dotted = 'law.type = "hunt-crossley"\nlaw.stiffness = 1e5  # 1e5\nlaw.dissipation = 0.3'
+    source.write_text(text.replace(law, dotted))
     changes = {
         "contact.tip.law.stiffness": "2e5",
         "contact.tip.law.dissipation": "0.0",
@@ -232,9 +182,7 @@ def test_values_are_written_in_place_whatever_the_form(tmp_path):
     # A table that the file does not have is made; a key that no scenario may have is refused.
     changes = {"shell.plate.placement.xyz": "[0.0, 0.0, 1.0]"}
     target.write_text(scenario_text(source, changes, target.parent))
-    assert (
-        read_scenario(target).shell[0].placement
-        == read_scenario(source, changes).shell[0].placement
-    )
+    was, now = read_scenario(source, changes), read_scenario(target)
+    assert was.shell[0].placement == now.shell[0].placement
     with pytest.raises(ScenarioError, match=r"shell\.plate\.depth"):
         scenario_text(source, {"shell.plate.depth": "1.0"}, target.parent)

@@ -13,9 +13,10 @@ from sphshell_pin.study.report.contents import Spread
 from sphshell_pin.study.report.swing import GRAVITY, MASS
 
 
-def integrated(slope, start, t, method="DOP853"):
+def integrated(slope, start, t, **more):
     """Return rows of a solution by SciPy."""
-    return solve_ivp(slope, (0, t[-1]), start, method, t, rtol=1e-10, atol=1e-15).y.T
+    given = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-15, **more}
+    return solve_ivp(slope, (0, t[-1]), start, t_eval=t, **given).y.T
 
 
 def test_closed_form_of_the_bounces():
@@ -24,11 +25,8 @@ def test_closed_form_of_the_bounces():
     def slope(_, y):
         return [y[1], -GRAVITY + 1e4 / MASS * max(0.0, -y[0])]
 
-    found = solve_ivp(
-        slope, (0, 0.2), [closed_forms.FALL, 0.0], "DOP853", t, rtol=1e-12, atol=1e-15,
-        max_step=1e-4,
-    )  # fmt: skip
-    assert closed_forms.bounce(t, 1e4)[0] == pytest.approx(found.y[0], abs=1e-8)
+    rows = integrated(slope, [closed_forms.FALL, 0.0], t, rtol=1e-12, max_step=1e-4)
+    assert closed_forms.bounce(t, 1e4)[0] == pytest.approx(rows[:, 0], abs=1e-8)
 
 
 def test_closed_form_of_the_gliding_ball():
@@ -41,7 +39,7 @@ def test_closed_form_of_the_gliding_ball():
         push = closed_forms.STIFF * depth - damping * y[1]
         return [y[1], -GRAVITY + push / MASS]
 
-    rows = integrated(slope, [-1.5 * sag, 0.0], t, "Radau")
+    rows = integrated(slope, [-1.5 * sag, 0.0], t, method="Radau")
     figures = case.exact(t)
     assert figures[:, 2] == pytest.approx(-rows[:, 0] / sag, abs=1e-6)
     along = np.cos(np.sqrt(closed_forms.SPRING / MASS) * t)
@@ -91,11 +89,8 @@ def test_one_core_for_a_while():
 
 def test_contestants_take_turns_and_say_how_far_they_are():
     heard, turns = [], []
-    times = timing.take_turns(
-        {name: lambda name=name: float(turns.append(name) or len(turns)) for name in "ab"},
-        3,
-        heard.append,
-    )
+    taken = {name: lambda name=name: float(turns.append(name) or len(turns)) for name in "ab"}
+    times = timing.take_turns(taken, 3, heard.append)
     assert "".join(turns) == "abababab"  # the first turn warms up
     assert {name: list(of) for name, of in times.items()} == {"a": [3, 5, 7], "b": [4, 6, 8]}
     assert heard == [0.25, 0.5, 0.75, 1.0]

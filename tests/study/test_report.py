@@ -95,10 +95,8 @@ def table_of(path):
 
 def test_whole_report(small, tmp_path):
     heard = []
-    report = making.make_report(
-        tmp_path, quick=True, command="sphshell-pin report <x>",
-        tell=lambda title, share: heard.append(share),
-    )  # fmt: skip
+    more = {"command": "sphshell-pin report <x>", "tell": lambda _, share: heard.append(share)}
+    report = making.make_report(tmp_path, quick=True, **more)
     assert [s.error for s in report.sections] == [None] * 4
     assert heard == sorted(heard)
     assert 0 <= heard[0] <= heard[-1] <= 1 + 1e-12
@@ -153,9 +151,8 @@ def test_findings_on_forces_are_those_of_the_worst_surface():
     found = {one.key: one.value for one in convergence.assemble(rows).findings}
     lines = [convergence.of(rows, name, convergence.SMOOTH) for name in convergence.CURVED]
     assert found["force_error"] == max(map(convergence.error_at, lines))
-    assert found["force_error_largest"] == max(
-        convergence.error_at(line, "largest") for line in lines
-    )
+    largest = max(convergence.error_at(line, "largest") for line in lines)
+    assert found["force_error_largest"] == largest
     assert found["force_order"] == min(map(convergence.order, lines))
 
 

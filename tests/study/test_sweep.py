@@ -11,14 +11,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sphshell_pin import robots
-from sphshell_pin.errors import InvalidParameter, MissingExtra, ResultError, SweepError
+from sphshell_pin import errors, robots
+from sphshell_pin.errors import ResultError, SweepError
 from sphshell_pin.plot.sweep import plot_sweep
 from sphshell_pin.study.sweep import plan_sweep, run_plan, sweep
 from sphshell_pin.study.sweep.worker import prepare
 from tests.command import call, refused, succeed
 from tests.programs import python
 from tests.study.resting import GRAVITY, RADIUS, write
+from tests.tables import cases_of
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
@@ -121,22 +122,20 @@ def test_a_run_that_kills_its_workers_is_given_up_in_a_script_without_a_guard(tm
         "from sphshell_pin.study.sweep import sweep\n"
         f"print(*sweep({str(path)!r}, {SMALL}, workers=1)['status'])\n"
     )
-    told = subprocess.run(
-        [sys.executable, program], capture_output=True, text=True, check=True, timeout=900
-    )
+    command = [sys.executable, program]
+    told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=900)
     assert (told.stdout, told.stderr) == ("done failed done done\n", "")
 
 
 def test_done_runs_are_not_done_again_and_a_table_grows(scenario, tmp_path):
     out, calls = tmp_path / "table.parquet", []
     sweep(scenario, {STIFFNESS: [1e4, 3e4]}, workers=0, out=out)
-    table = run_plan(
-        plan_sweep(scenario, SMALL), workers=0, out=out, progress=lambda *one: calls.append(one)
-    )
+    more = {"workers": 0, "out": out, "progress": lambda *one: calls.append(one)}
+    table = run_plan(plan_sweep(scenario, SMALL), **more)
     assert (calls[0], len(table)) == ((2, 0, 4), 4)
     calls.clear()
     whole = out.read_bytes()
-    sweep(scenario, SMALL, workers=0, out=out, progress=lambda *counts: calls.append(counts))
+    sweep(scenario, SMALL, **more)
     assert calls == [(4, 0, 4)]
     assert out.read_bytes() == whole
     pd.testing.assert_frame_equal(pd.read_parquet(out), table, check_dtype=False)
@@ -207,10 +206,10 @@ def test_units_stay_with_the_table(scenario, tmp_path):
     (axis,) = plot_sweep(table, "final.q.root_joint.2").axes
     assert axis.get_xlabel() == f"{STIFFNESS} [N/m^1.5]"
     assert axis.get_ylabel() == "final.q.root_joint.2 [m]"
-    vary = {STIFFNESS: [1e4], EXPONENT: [1.5, 2.0], "run.duration": [0.1]}
+    vary = {STIFFNESS: [1e4], EXPONENT: [1.5, 2.0], "run.duration": [0.1], "run.rtol": [1e-5]}
     units = plan_sweep(scenario, vary).units
     # Where the exponent varies, too, the unit of the stiffness does.
-    assert (units["run.duration"], STIFFNESS in units) == ("s", False)
+    assert (units["run.duration"], STIFFNESS in units, "run.rtol" in units) == ("s", False, False)
 
 
 def test_a_routine_that_breaks_or_remembers_touches_no_other_run(tmp_path):
@@ -231,9 +230,8 @@ def test_words_lists_and_expectations(scenario):
     assert table["gravity"].tolist() == ["[0, 0, -9.81]", "[0, 0, -1.62]"] * 2
     deep, shallow = table["figures.depth"][:2]
     assert shallow / deep == pytest.approx((1.62 / 9.81) ** (1 / 1.5), rel=1e-8)
-    assert (
-        table["met.figures.depth"].tolist() == [float(one <= 1e-4) for one in (deep, shallow)] * 2
-    )
+    met = [float(one <= 1e-4) for one in (deep, shallow)] * 2
+    assert table["met.figures.depth"].tolist() == met
 
 
 def test_a_worker_with_other_files_or_versions_is_told(scenario, tmp_path):
@@ -250,26 +248,13 @@ def test_a_worker_with_other_files_or_versions_is_told(scenario, tmp_path):
     prepare(job)
 
 
-@pytest.mark.parametrize(
-    ("kind", "words", "arguments"),
-    [
-        (InvalidParameter, r"must end in \.parquet", {"out": "nothing.csv"}),
-        (InvalidParameter, "0 or more", {"workers": -1}),
-        (InvalidParameter, "whole number", {"workers": 1.5}),
-        (InvalidParameter, "whole number", {"workers": True}),
-        (InvalidParameter, "scheduler", {"workers": 2, "scheduler": "tcp://127.0.0.1:8786"}),
-        (ResultError, "cannot be written", {"out": "resting.toml/table.parquet"}),
-        (ResultError, "is a folder", {"out": "folder.parquet"}),
-        (MissingExtra, r"pandas.*sphshell-pin\[sweep\]", {"out": "nothing.parquet"}),
-        (MissingExtra, r"pyarrow.*sphshell-pin\[sweep\]", {"out": "nothing.parquet"}),
-    ],
-)
+@pytest.mark.parametrize(("kind", "words", "arguments"), cases_of("wrong_sweeps")["calls"])
 def test_wrong_arguments_are_told_and_leave_nothing(scenario, monkeypatch, kind, words, arguments):
     monkeypatch.chdir(scenario.parent)
     (scenario.parent / "folder.parquet").mkdir(exist_ok=True)
-    if kind is MissingExtra:
+    if kind == "MissingExtra":
         monkeypatch.setitem(sys.modules, words.partition(".")[0], None)
-    with pytest.raises(kind, match=words):
+    with pytest.raises(getattr(errors, kind), match=words):
         sweep(scenario, SMALL, **{"workers": None, **arguments})
     assert not list(scenario.parent.glob("nothing*"))
 
@@ -278,9 +263,8 @@ def test_pictures_and_failed_runs_are_told(scenario):
     pytest.importorskip("matplotlib")
     out = scenario.parent / "failed.parquet"
     radii = ["--vary", "contact.sphere.radius=0.012,0.03", "--workers", "0", "--out", out]
-    told = succeed(
-        "sweep", scenario, *radii, "--plot", "figures.depth", "--plot", "energy.residual"
-    )
+    plotted = "--plot", "figures.depth", "--plot", "energy.residual"
+    told = succeed("sweep", scenario, *radii, *plotted)
     assert "2 runs, 1 done, 1 failed" in told.output
     words = "run 1 failed (contact.sphere.radius = 0.03 m): contact 'ball-plate' starts"
     assert words in told.output
@@ -290,12 +274,7 @@ def test_pictures_and_failed_runs_are_told(scenario):
     assert call("sweep", scenario, *vary, "--out", scenario.parent / "none.parquet").exit_code == 2
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--vary", f"{STIFFNESS}=1,2", "--plot", "peak"], "no figure 'peak'"),
-        ([], "must say what varies"),
-    ],
-)
-def test_faults_are_one_sentence(scenario, options, words):
-    assert words in refused("sweep", scenario, *options)
+def test_faults_are_one_sentence(scenario):
+    plotted = "--vary", f"{STIFFNESS}=1,2", "--plot", "peak"
+    assert "no figure 'peak'" in refused("sweep", scenario, *plotted)
+    assert "must say what varies" in refused("sweep", scenario)

@@ -38,14 +38,12 @@ class Cluster:
     def start(self, kind, *options):
         command = [sys.executable, "-m", "dask", kind, "--scheduler-file", self.file, *options]
         with open(self.folder / f"{kind}-{len(self.processes)}.log", "wb") as log:
-            self.processes.append(
-                subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
-            )
+            child = subprocess.Popen(command, cwd=self.folder, stdout=log, stderr=log)
+        self.processes.append(child)
 
     def start_worker(self, *options, threads=1):
-        self.start(
-            "worker", "--nthreads", str(threads), "--no-dashboard", "--host", "127.0.0.1", *options
-        )
+        more = "--nthreads", str(threads), "--no-dashboard", "--host", "127.0.0.1", *options
+        self.start("worker", *more)
 
     def close(self):
         for process in reversed(self.processes):

@@ -12,12 +12,14 @@ from sphshell_pin.plot.uncertainty import plot_uncertainty
 from sphshell_pin.study.sweep import plan_sweep, quantiles, sample_of, sobol_indices, sweep
 from tests.command import succeed
 from tests.study.resting import GRAVITY
+from tests.tables import cases_of
 
 pd = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
 pytest.importorskip("matplotlib")
 
 STIFFNESS, DAMPING = "contact.law.stiffness", "contact.law.damping"
+WRONG = cases_of("wrong_sweeps")
 DIST = {STIFFNESS: "lognormal(1e5,1.5)", DAMPING: "uniform(1,5)"}
 
 # Ishigami's function: T. Ishigami and T. Homma, ISUMA 1990; variances V1, V2 and V13, all others
@@ -66,54 +68,17 @@ def test_quantiles_are_those_of_the_textbook():
     np.testing.assert_allclose(found, [[8, 10, 12], 10 + 2 * shares, [4, 6, 9]], rtol=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("dist", "words"),
-    [
-        ({}, "must say what is uncertain"),
-        (["a"], "must be KEY=DISTRIBUTION, one of normal"),
-        (["a=normal"], r"must be one of normal\(mean,deviation\), uniform"),
-        (["a=gauss(1,2)"], "must be one of normal"),
-        (["a=normal(1;2)"], "must be one of normal"),
-        (["a=normal(1,-2)"], "must have deviation > 0"),
-        (["a=uniform(2,1)"], "must have low < high"),
-        (["a=lognormal(12.2,0.4)"], "must have median > 0, factor > 1"),
-        (["a=normal(1,2)", "a=normal(1,3)"], "a' is given twice"),
-        (["a=uniform(-1e308,1e308)"], "not finite"),
-        ({"a": [1, 2]}, "must be one of normal"),
-        (3, "must map keys to distributions"),
-    ],
-)
+@pytest.mark.parametrize(("dist", "words"), WRONG["distributions"])
 def test_wrong_distributions_are_told(dist, words):
     with pytest.raises(InvalidParameter, match=words):
         sample_of(dist, 8)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({}, "vary must say what varies, as .* or dist what is uncertain"),
-        ({"vary": ["a=1,2"], "n": 8}, "n = 8 is for uncertain inputs"),
-        ({"vary": ["a=1,2"], "dist": DIST}, "vary = .* is for values in a grid"),
-        ({"dist": DIST}, "n = None must be a whole number"),
-        ({"dist": DIST, "n": 100}, "power of 2, such as 64 or 128"),
-        ({"dist": DIST, "n": 8, "seed": -1}, "whole number, 0 or more"),
-        ({"dist": DIST, "n": 2**19, "indices": True}, "1000000 at most"),
-        ({"dist": {"contact.law.stifness": "normal(1,2)"}, "n": 8}, "did you mean 'stiffness'"),
-        ({"dist": {"run.integrator": "normal(1,2)"}, "n": 8}, "run.integrator: should be a valid"),
-        ({"dist": {"contact.lw.k": "normal(1,2)"}, "n": 8}, "no item 'lw.k'"),
-        # Beyond the bounds: not cut off, not made a failed run, but told before anything runs.
-        (
-            {"dist": {STIFFNESS: "normal(1e5,6e4)"}, "n": 64},
-            r"3 points of 64 have a value that is not allowed; the first: .*stiffness: should be "
-            r"greater than 0 \(given: -.*lognormal\(median,factor\) is positive",
-        ),
-        ({"dist": DIST | {"contact.ball-plate.law.stiffness": "uniform(1,2)"}, "n": 8},
-         "dist = .* is given twice: leave one of the two out"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arguments", "words"), WRONG["arguments"])
 def test_arguments_that_do_not_go_together_are_told(scenario, arguments, words):
+    stated = {key: DIST if value == "DIST" else value for key, value in arguments.items()}
     with pytest.raises((InvalidParameter, ScenarioError), match=words):
-        plan_sweep(scenario, **arguments)
+        plan_sweep(scenario, **stated)
 
 
 def test_each_interval_of_equal_probability_has_one_point():

@@ -9,21 +9,9 @@ import pytest
 import sphshell_pin as sp
 from sphshell_pin import testing
 from sphshell_pin.errors import InvalidParameter, WeakLawWarning
-from tests import meshes
+from tests import meshes, models
 from tests.contact.smooth.surfaces import shell_of
-from tests.models import (
-    ARM_Q,
-    arm,
-    ball,
-    free_q,
-    linear_law,
-    on_plate,
-    plate,
-    pose_of,
-    slider,
-    two_free_bodies,
-    two_free_state,
-)
+from tests.models import ARM_Q, arm, ball, free_q, linear_law, on_plate, plate, pose_of, slider
 
 LAW = sp.ImpactLaw(4e4, 1.5, 20.0, 2e-2)
 FRICTION = sp.CoulombFriction(0.3, 0.1, 0.1, 1.0)
@@ -69,21 +57,21 @@ def test_a_right_scene_passes(friction) -> None:
     assert testing.assert_forces_balance(scene, ARM_Q, ARM_V, tau=tau) < 1e-12
     assert testing.assert_derivatives(scene, ARM_Q, ARM_V) < 1e-6
     assert testing.assert_contacts_found(scene, ARM_Q) < 1e-12
-    free = two_free_bodies(LAW, friction)
-    assert testing.assert_wrenches_cancel(free, *two_free_state()) < 1e-13
-    assert testing.assert_derivatives(free, *two_free_state()) < 1e-6
+    free = models.two_free_bodies(LAW, friction)
+    assert testing.assert_wrenches_cancel(free, *models.two_free_state()) < 1e-13
+    assert testing.assert_derivatives(free, *models.two_free_state()) < 1e-6
 
 
 def test_a_wrong_wrench_is_told() -> None:
     message = r"forces do not balance: \S+ \(at most 1e-08\), joint"
     with pytest.raises(AssertionError, match=message):
         testing.assert_forces_balance(arm_scene(Weaker), ARM_Q, ARM_V)
-    right = two_free_bodies(LAW, FRICTION)
+    right = models.two_free_bodies(LAW, FRICTION)
     wrong, (pair,) = Weaker(right.model), right.pairs
     where = pair.frame_j, pair.side_j.placement
     wrong.add_contact(pair.side_i.sphere, pair.side_j.shell, *where, LAW, FRICTION, "facets")
     with pytest.raises(AssertionError, match=r"action and reaction differ.*leave a force of \("):
-        testing.assert_wrenches_cancel(wrong, *two_free_state())
+        testing.assert_wrenches_cancel(wrong, *models.two_free_state())
 
 
 @pytest.mark.parametrize("entry", [0, 1])
@@ -107,7 +95,8 @@ def test_a_single_joint_has_matrices_too() -> None:
 
 
 def closed_run(integrator, law=LAW, friction=FRICTION):
-    return sp.Simulation(two_free_bodies(law, friction), integrator).run(*two_free_state(), 0.02)
+    scene = models.two_free_bodies(law, friction)
+    return models.run(scene, integrator, *models.two_free_state(), 0.02)
 
 
 def test_momentum_of_a_closed_system_is_kept() -> None:
@@ -134,7 +123,7 @@ def run_of(scene, *start, **more):
 
 
 SHORT = free_q([0, 0, 0.049]), None, 1e-3
-FAR = *two_free_state(-1.0), 1e-3
+FAR = *models.two_free_state(-1.0), 1e-3
 FIXED = on_plate(ball(gravity=0.0), LAW)
 balance, wrenches = testing.assert_forces_balance, testing.assert_wrenches_cancel
 momentum, lossless = testing.assert_momentum_kept, testing.assert_lossless_energy_kept
@@ -145,19 +134,10 @@ momentum, lossless = testing.assert_momentum_kept, testing.assert_lossless_energ
     [
         ("touches the universe", lambda: wrenches(arm_scene(), ARM_Q)),
         ("mass matrix is singular", lambda: balance(massless(), ARM_Q)),
-        (
-            r"tau has shape \(2,\)|tau = \(2,\)",
-            lambda: balance(arm_scene(), ARM_Q, tau=[0, 0]),
-        ),
+        (r"tau has shape \(2,\)|tau = \(2,\)", lambda: balance(arm_scene(), ARM_Q, tau=[0, 0])),
         ("gravity", lambda: momentum(run_of(arm_scene(), ARM_Q, ARM_V, 1e-3))),
-        (
-            "nothing touched",
-            lambda: momentum(run_of(two_free_bodies(LAW), *FAR)),
-        ),
-        (
-            "not touch the universe",
-            lambda: momentum(run_of(FIXED, *SHORT)),
-        ),
+        ("nothing touched", lambda: momentum(run_of(models.two_free_bodies(LAW), *FAR))),
+        ("not touch the universe", lambda: momentum(run_of(FIXED, *SHORT))),
         ("must know its scene", lambda: momentum(replace(closed_run(sp.Adaptive()), scene=None))),
         ("without damping, friction", lambda: lossless(run_of(arm_scene(), ARM_Q, ARM_V, 0.01))),
         ("must be 'both'", lambda: testing.assert_no_contact_missed(plate(side="outside"), 0.1)),

@@ -14,7 +14,5 @@ def overlapping(boxes, slack=0.0):
     def share(a, b, low, high):
         return min(a[high], b[high]) - max(a[low], b[low]) > slack
 
-    pairs = itertools.combinations(boxes, 2)
-    return [
-        (a, b) for a, b in pairs if share(a, b, "left", "right") and share(a, b, "top", "bottom")
-    ]
+    pairs = [two for two in itertools.combinations(boxes, 2) if share(*two, "left", "right")]
+    return [two for two in pairs if share(*two, "top", "bottom")]

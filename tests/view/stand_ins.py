@@ -8,13 +8,12 @@ import pinocchio as pin
 import sphshell_pin as sp
 from sphshell_pin.dynamics.result.result_parts import ContactLog
 from sphshell_pin.dynamics.result.run_stats import RunStats
-from tests import models
+from tests import meshes, models
 
 
 def plate(size=1.0, name="plate"):
     """A square plate at z = 0."""
-    corners = 0.5 * size * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
-    return sp.Shell(corners, [[0, 1, 2, 3]], name=name)
+    return sp.Shell(*meshes.grid_plate(size=size, quads=True), name=name)
 
 
 def contact_pair(

@@ -9,11 +9,9 @@ from tests.view.drawn import Film
 
 def forces(*normal, friction=None):
     count = len(normal)
-    return Forces(
-        np.arange(3.0 * count).reshape(count, 3),
-        np.array(normal, dtype=float)[:, None] * [0.6, 0.0, 0.8],
-        np.zeros((count, 3)) if friction is None else np.array(friction),
-    )
+    pushes = np.outer(normal, [0.6, 0.0, 0.8])
+    rubs = np.zeros((count, 3)) if friction is None else np.array(friction)
+    return Forces(np.arange(3.0 * count).reshape(count, 3), pushes, rubs)
 
 
 def last_transforms(pool_of, given, scale, **options):

@@ -11,6 +11,7 @@ from sphshell_pin.view import film
 from sphshell_pin.view.film import render_film
 from tests.command import succeed
 from tests.scenario.files import write
+from tests.tables import cases_of
 from tests.view.stand_ins import ball_on_plate
 
 Image = pytest.importorskip("PIL.Image")
@@ -83,23 +84,8 @@ def test_ctrl_c_leaves_nothing(rendered, tmp_path, keyboard):
 @pytest.mark.parametrize(
     ("name", "options", "told"),
     [
-        ("run.avi", {}, r"run\.avi' must end in \.png or \.mp4"),
-        ("run.png", {"time": 3.5}, "time = 3.5 must be in the run: 0 to 3 s"),
+        *cases_of("wrong_films")["rows"],
         ("run.mp4", {"span": (-1.0, None)}, "span = -1.0 must be in the run"),
-        ("run.mp4", {"span": (2.0, 2.0)}, "span = '2 to 2 s' must end after it begins"),
-        ("run.mp4", {"time": 1.0}, "time = 1.0 is for a .png"),
-        ("run.png", {"speed": 5.0}, "speed = 5.0 is for a film"),
-        ("run.mp4", {"fps": 0}, "fps = 0 must be positive"),
-        ("run.mp4", {"fps": 1e9}, "fps = 1000000000.0 gives 3e\\+09 frames, of 1000000 at most"),
-        ("run.mp4", {"speed": "fast"}, "speed = 'fast' must be a number"),
-        ("run.png", {"size": "big"}, "size = 'big' must hold 2 numbers"),
-        ("run.png", {"size": (100,)}, "size has shape"),
-        ("run.png", {"size": (100.5, 200)}, "size = '100.5x200' must be whole numbers"),
-        ("run.png", {"time": "late"}, "time = 'late' must be"),
-        ("run.mp4", {"span": 3}, "span = 3 must be two times"),
-        ("run.mp4", {"size": (161, 120)}, "size = '161x120' must be even"),
-        ("run.png", {"size": (10, 120)}, "'10x120' must be whole numbers between 64 and 7680"),
-        ("run.png", {"camera": "behind"}, "camera = 'behind' must be one of fit, front"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused_before_anything_starts(run, tmp_path, name, options, told):

@@ -4,29 +4,19 @@ import pytest
 
 from sphshell_pin.view.live import Live
 from tests.programs import serving
+from tests.texts import text_of
 from tests.view.live_client import inside
 from tests.view.live_player import BallPlayer
 
 pytestmark = pytest.mark.browser
+
+ATTACK = text_of("page/attack.js")
 
 
 @pytest.fixture(scope="module")
 def live():
     with Live(BallPlayer(), running=False) as standing:
         yield standing
-
-
-ATTACK = """async (urls) => {
-    const socket = (url) => new Promise((done) => {
-        const one = new WebSocket(url.replace("http", "ws"));
-        one.onopen = () => done("open");
-        one.onclose = () => done("closed");
-    });
-    const read = (url) => fetch(url).then((answer) => answer.text()).catch(() => "refused");
-    const seen = [];
-    for (const url of urls) seen.push(await socket(url), await read(url));
-    return seen;
-}"""
 
 
 @pytest.mark.parametrize("name", ["evil.example", "127.0.0.1"])

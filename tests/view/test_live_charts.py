@@ -88,11 +88,8 @@ def test_only_the_curves_that_are_asked_for_are_computed():
 
 def test_forces_are_summed_and_listed_by_pair():
     charts = charts_of()
-    forces = [
-        "normal",
-        "friction",
-        *(f"{n}.{k}" for k in ("left", "right") for n in ("normal", "friction")),
-    ]
+    ends = ("", ".left", ".right")
+    forces = [kind + end for kind in ("normal", "friction") for end in ends]
     units = dict.fromkeys(forces, "N") | dict.fromkeys(("depth.left", "depth.right"), "mm")
     assert {one["key"]: one["unit"] for one in charts.descriptions()} == units
     charts.ask("tab", ["depth.right", "friction.left", "normal"])

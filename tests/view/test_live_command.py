@@ -11,15 +11,11 @@ import pytest
 from sphshell_pin.scenario import build
 from sphshell_pin.scenario.running.run import simulate
 from sphshell_pin.view.live import Live, opening
-from tests.command import call, refused
+from tests.command import refused, succeed
 from tests.programs import HEARS_CTRL_C
 from tests.scenario.files import write
 from tests.view.live_client import get
 from tests.view.live_player import BallPlayer
-
-
-def view(*arguments):
-    return call("view", *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +39,7 @@ def test_it_serves_a_page_and_ctrl_c_ends_it(tmp_path):
 
 
 def test_a_finished_run_is_a_recording_beside_it(finished):
-    told = view(finished, "--no-open", "--faces", "--speed", "0.5")
-    assert told.exit_code == 0, told.output
+    told = succeed("view", finished, "--no-open", "--faces", "--speed", "0.5")
     page = finished / "run.html"
     assert told.output.strip() == str(page)
     assert page.read_text(encoding="utf-8").startswith("<!")
@@ -86,6 +81,5 @@ def test_a_browser_is_opened_only_where_there_is_a_screen(monkeypatch, tmp_path)
 def test_other_machines_are_let_in_with_a_warning_only(tmp_path, monkeypatch):
     monkeypatch.setattr(Live, "run", lambda live: live.stop())
     for host, warned in (("127.0.0.1", False), ("0.0.0.0", True), ("", True)):
-        told = view(write(tmp_path), "--no-open", "--host", host)
-        assert told.exit_code == 0
+        told = succeed("view", write(tmp_path), "--no-open", "--host", host)
         assert ("everybody" in told.stderr) is warned

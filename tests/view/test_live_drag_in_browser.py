@@ -10,17 +10,12 @@ from sphshell_pin.scenario.live.live_run import LiveRun
 from tests.models import pose_of
 from tests.scenario.arms import write_arm
 from tests.scenario.files import DROP, write
+from tests.texts import text_of
 from tests.view.test_live_in_browser import opened  # noqa: F401  (a fixture)
 
 pytestmark = pytest.mark.browser
 
-ON_SCREEN = """([x, y, z]) => {
-    const at = new MeshCat.THREE.Vector3(x, z, -y);
-    viewer.camera.updateMatrixWorld();
-    at.project(viewer.camera);
-    const box = document.querySelector("#scene").getBoundingClientRect();
-    return [box.left + 0.5 * (1 + at.x) * box.width, box.top + 0.5 * (1 - at.y) * box.height];
-}"""
+ON_SCREEN = text_of("page/on_screen.js")
 EYE = "viewer.camera.position.toArray()"
 IN_LOWER = np.array([0.0, 0.0, 0.2])  # a point of the arm's second link
 

@@ -7,23 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sphshell_pin.view.live.events import FIELDS, LARGEST_MESSAGE, BadMessage, read_event
+from tests.tables import cases_of
 
 PUSH = {"type": "push", "body": "tip", "direction": [0, 3, 4], "newtons": 2, "seconds": 0.1}
-BAD = {
+BAD = cases_of("bad_events")["texts"] | {
     "bytes": b"\x00\x01",
-    "no JSON": "pause!",
-    "no object": "[1, 2]",
-    "no type": "{}",
-    "unknown": '{"type": "explode"}',
-    "type of a wrong type": '{"type": ["run"]}',
-    "missing field": '{"type": "speed"}',
-    "text for a number": '{"type": "speed", "value": "fast"}',
-    "truth for a number": '{"type": "speed", "value": true}',
-    "number for a truth": '{"type": "run", "on": 1}',
-    "not a number": '{"type": "speed", "value": NaN}',
-    "infinite": '{"type": "parameter", "key": "k", "value": Infinity}',
     "beyond floats": '{"type": "parameter", "key": "k", "value": 1' + 400 * "0" + "}",
-    "negative": '{"type": "step", "seconds": -1}',
     "a long name": json.dumps({"type": "parameter", "key": 300 * "k", "value": 1.0}),
     "a direction of no length": json.dumps({**PUSH, "direction": [0, 0, 0]}),
     "a direction of two": json.dumps({**PUSH, "direction": [0, 1]}),

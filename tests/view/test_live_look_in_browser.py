@@ -140,32 +140,14 @@ def test_all_text_has_contrast(look, scheme, size):
 @pytest.mark.parametrize("size", NARROW + WIDE)
 def test_messages_lie_over_no_line_of_the_legend(look, size):
     look.show(size)
-    boxes = look.page.evaluate("""async () => {
-      const { notice, toast } = await import("./notices.js");
-      const hidden = [...document.querySelectorAll("#legend > div[hidden]")].slice(0, 3);
-      for (const one of hidden) one.hidden = false;
-      notice("The run has ended.", "test");
-      for (const k of [1, 2]) toast(`A message of more than a line on a narrow page, no. ${k}`);
-      const those = document.querySelectorAll("#status, #legend, #notice, #toasts div");
-      const boxes = [...those].map((one) => one.getBoundingClientRect().toJSON());
-      for (const one of hidden) one.hidden = true;
-      notice(null);
-      document.getElementById("toasts").replaceChildren();
-      return boxes;
-    }""")
+    boxes = look.page.evaluate(text_of("page/messages.js"))
     assert len(boxes) == 5
     assert overlapping(boxes) == []
 
 
 def test_every_control_has_a_name_and_messages_are_announced(look):
     # A select is named by its label, not by its options; meshcat's own controls are hidden.
-    nameless = look.page.evaluate("""() => [...document.querySelectorAll(
-        "button, input, select, summary, canvas, iframe, dialog")].filter((one) => {
-            if (one.closest("#scene, .dg")) return false;
-            const text = !one.matches("select, input") && one.textContent.trim();
-            return !(text || one.ariaLabel || one.labels?.[0]?.textContent.trim() ||
-                document.getElementById(one.getAttribute("aria-labelledby"))?.textContent);
-        }).map((one) => one.outerHTML)""")
+    nameless = look.page.evaluate(text_of("page/nameless.js"))
     assert nameless == []
     live = look.page.evaluate("""() => ["notice", "toasts"].map((name) => {
         const one = document.getElementById(name);

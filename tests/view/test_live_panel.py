@@ -30,19 +30,14 @@ def test_a_late_browser_gets_all_rows_and_the_newest_state():
 
 def test_json_has_no_nan_and_no_infinity():
     value = {"a": np.nan, "b": [np.inf, np.float64(1 / 3)], "c": np.int32(3), "d": np.bool_(True)}
-    text = dump({**value, "e": np.array([1.5, -np.inf])})
-    assert json.loads(text) == {"a": None, "b": [None, 0.333333333], "c": 3, "d": True} | {
-        "e": [1.5, None]
-    }
+    told = json.loads(dump({**value, "e": np.array([1.5, -np.inf])}))
+    assert told == {"a": None, "b": [None, 0.333333333], "c": 3, "d": True, "e": [1.5, None]}
 
 
 def test_contacts_are_listed_in_millimeters_and_stick_creep_or_slip():
-    laws = [
-        None,
-        CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1),
-        BristleFriction(0.3, 0.2, stiffness=1e5, v_stribeck=0.1),
-    ]
-    pairs = tuple(SimpleNamespace(friction=law) for law in laws)
+    creeps = CoulombFriction(0.3, 0.2, v_static=0.01, v_dynamic=0.1)
+    sticks = BristleFriction(0.3, 0.2, stiffness=1e5, v_stribeck=0.1)
+    pairs = tuple(SimpleNamespace(friction=law) for law in (None, creeps, sticks))
     rows = np.zeros(5, ROW)
     rows["pair"] = [0, 1, 1, 2, 2]
     rows["depth"], rows["normal_force"] = 2e-4, 5.0

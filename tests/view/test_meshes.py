@@ -11,16 +11,8 @@ import pytest
 import umsgpack
 
 import sphshell_pin.view.page as page_module
-from sphshell_pin.view.meshes import (
-    LEVELS,
-    MARK,
-    STL_HEADER,
-    STL_RECORD,
-    lit_facets,
-    pack_facets,
-    pack_numbers,
-    take_out_numbers,
-)
+from sphshell_pin.view import meshes
+from sphshell_pin.view.meshes import LEVELS, MARK, STL_HEADER, STL_RECORD, lit_facets
 from sphshell_pin.view.robot import GeometryRobot
 from tests import urdf
 from tests.view.drawn import Film
@@ -52,15 +44,17 @@ def sphere_points(count):
 def test_indices_are_exact(count):
     indices = np.random.default_rng(count).integers(0, 2_000_000, count)
     indices[:20] = np.arange(20)
-    packed = pack_numbers(indices.astype(float), exact=True)
+    packed = meshes.pack_numbers(indices.astype(float), exact=True)
     np.testing.assert_array_equal(restored(packed), indices)
 
 
 def test_coordinates_keep_a_part_of_the_meshs_size_and_equal_ones_stay_equal():
     points = 0.3 * sphere_points(300).reshape(-1) + 0.1
-    error = restored(pack_numbers(points, exact=False)) - points
+    error = restored(meshes.pack_numbers(points, exact=False)) - points
     assert np.abs(error).max() <= 0.5001 * np.ptp(points) / LEVELS
-    np.testing.assert_array_equal(restored(pack_numbers(np.full(90, 0.25), exact=False)), 0.25)
+    np.testing.assert_array_equal(
+        restored(meshes.pack_numbers(np.full(90, 0.25), exact=False)), 0.25
+    )
 
 
 MESH = """<COLLADA><asset><unit meter="0.001"/></asset>
@@ -77,7 +71,7 @@ def a_mesh():
 
 def test_only_long_lists_of_numbers_are_taken_out():
     text, points, indices = a_mesh()
-    rest, numbers = take_out_numbers(text)
+    rest, numbers = meshes.take_out_numbers(text)
     assert len(numbers) == rest.count(MARK) == 2
     assert "<p>0 1 2</p>" in rest
     assert "NaN" in rest
@@ -88,7 +82,7 @@ def test_only_long_lists_of_numbers_are_taken_out():
     assert small < 0.5 * len(gzip.compress(text.encode()))
     # A text with the mark is left alone.
     marked = text.replace("NaN", MARK)
-    assert take_out_numbers(marked) == (marked, [])
+    assert meshes.take_out_numbers(marked) == (marked, [])
 
 
 def ball(rings=24):
@@ -120,7 +114,7 @@ def stl(corners, title=b"", normals=None):
 def test_facets_keep_their_corners(title):
     corners = ball()
     data = stl(corners, title)
-    packed = pack_facets(data)
+    packed = meshes.pack_facets(data)
     points = restored(packed["points"]).reshape(-1, 3)
     again = points[restored(packed["corners"]).astype(int)].reshape(-1, 3, 3)
     assert np.abs(again - corners).max() <= 0.51 * np.ptp(corners) / LEVELS + 1e-7
@@ -133,7 +127,7 @@ def test_the_page_restores_collada_and_stl(browser):
     wanted = r"^function unfold.*?^function restore_facets.*?^}$"
     functions = re.search(wanted, PAGE.read_text("utf-8"), re.S | re.M)[0]
     text, points, indices = a_mesh()
-    rest, numbers = take_out_numbers(text)
+    rest, numbers = meshes.take_out_numbers(text)
     page = browser.new_page()
 
     def call(name, *arguments):
@@ -147,7 +141,7 @@ def test_the_page_restores_collada_and_stl(browser):
     np.testing.assert_array_equal(np.array(bodies[1].split(), int), indices)
     corners = ball(8)
     given = stl(corners)
-    again = bytes(call("restore_facets", pack_facets(given)))
+    again = bytes(call("restore_facets", meshes.pack_facets(given)))
     page.close()
     row = np.dtype([("f", "<f4", (4, 3)), ("a", "<u2")])
     facets, wanted = (np.frombuffer(file[84:], row)["f"] for file in (again, given))

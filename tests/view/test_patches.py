@@ -24,11 +24,8 @@ def pool():
     def shown(rows, patches, scale):
         """The discs in the picture: (slot, level) and pose of each."""
         made.update(contact_log(rows), patches, scale)
-        return {
-            tuple(map(int, path.split("_")[1:])): matrix
-            for path, matrix in film.matrices.items()
-            if np.linalg.norm(matrix[:3, 0]) > 1e-5
-        }
+        seen = {k: one for k, one in film.matrices.items() if np.linalg.norm(one[:3, 0]) > 1e-5}
+        return {tuple(map(int, path.split("_")[1:])): one for path, one in seen.items()}
 
     return shown
 
