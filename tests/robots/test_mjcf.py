@@ -184,18 +184,7 @@ ARM = (
 )
 
 
-TENDON = (
-    '<tendon tendon1="t"/></equality><tendon><fixed name="t"><joint joint="j1" coef="1"/>'
-    "</fixed></tendon><equality>"
-)
-COUPLED = {
-    '<connect name="pin" body1="b" body2="c" anchor="0 0 0"/>': "loop that <connect> 'pin' closes "
-    "between 'b' and 'c', of the joints 'j1', 'j2', 'j3'",
-    '<weld body1="b"/>': "<weld> closes between 'b' and 'world', of the joints 'j1', 'j2'",
-    '<joint joint1="j1" joint2="j2" polycoef="0 1 2"/>': "'j1' follow 'j2' by a polynomial",
-    '<joint joint1="j1" polycoef="0.5"/>': r"holds joint 'j1' at 0.5 \(lock it",
-    TENDON: "<tendon> of <equality>",
-}
+COUPLED = cases_of("wrong_robots")["coupled"]
 
 
 @pytest.mark.parametrize("equality", COUPLED)

@@ -10,7 +10,6 @@ import pytest
 from tests.texts import text_of
 
 VALVE_BODY = Path(__file__).parents[2] / "scenarios" / "surfaces" / "valve_body.step"
-HIDE = text_of("hide_display.sh")
 READ = """
 import ctypes, sys
 import sphshell_pin as sp
@@ -28,7 +27,7 @@ print(len(sp.Shell.from_file(sys.argv[1]).faces))
 def without_display() -> list[str]:
     """Return the words before a command that hide the libraries from it."""
     unshare = shutil.which("unshare")
-    hidden = [str(unshare), "--mount", "bash", "-c", HIDE, "-"]
+    hidden = [str(unshare), "--mount", "bash", "-c", text_of("hide_display.sh"), "-"]
     if unshare is None or subprocess.run([*hidden, "true"], check=False, stderr=-3).returncode:
         pytest.skip("hiding a library needs the rights to make a mount namespace")
     return hidden
