@@ -53,7 +53,7 @@ def cases(known: dict[str, str]):
     if FOLDER:
         return sorted(p.name for p in Path(FOLDER).iterdir() if p.suffix.lower() in SUFFIXES + CAD)
     out = []
-    for name in corpus.FILES:
+    for name in corpus.KNOWN["figures"]:
         marks = [] if name in SOME else [pytest.mark.study]
         if name in known:
             marks.append(pytest.mark.xfail(strict=True, raises=AssertionError, reason=known[name]))
