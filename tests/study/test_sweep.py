@@ -3,6 +3,7 @@
 import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -125,6 +126,16 @@ def test_a_run_that_kills_its_workers_is_given_up_in_a_script_without_a_guard(tm
     command = [sys.executable, program]
     told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=900)
     assert (told.stdout, told.stderr) == ("done failed done done\n", "")
+
+
+def test_a_port_that_another_sweep_has_is_not_asked_for(scenario, recwarn):
+    """Dask's server would warn of its usual one."""
+    with socket.socket() as taken:
+        with contextlib.suppress(OSError):  # somebody else has it already
+            taken.bind(("", 8787))
+            taken.listen()
+        sweep(scenario, {STIFFNESS: [1e4]}, workers=1)
+    assert [one for one in recwarn if "8787" in str(one.message)] == []
 
 
 def test_done_runs_are_not_done_again_and_a_table_grows(scenario, tmp_path):

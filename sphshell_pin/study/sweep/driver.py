@@ -278,6 +278,7 @@ def _client(workers: int | None, runs: int, scheduler: str | None) -> Any:
         "memory_limit": None,
         "preload": worker.__name__,
         "dashboard_address": None,
+        "scheduler_kwargs": {"dashboard_address": "127.0.0.1:0"},  # its server has one all the same
         "silence_logs": "CRITICAL",
     }
     remote = {"address": scheduler, "timeout": _CONNECT_TIMEOUT}
