@@ -117,10 +117,12 @@ def test_neither_ctrl_c_nor_a_kill_leaves_a_worker(scenario, number):
 
 
 def test_a_run_that_kills_its_workers_is_given_up_in_a_script_without_a_guard(tmp_path):
-    """Processes that loaded the script would begin its sweep again."""
+    """Processes that loaded the script would begin its sweep again; workers come back slowly."""
     program, path = tmp_path / "script.py", write(tmp_path, "deadly")
     program.write_text(
+        "import dask\n"
         "from sphshell_pin.study.sweep import sweep\n"
+        "dask.config.set({'distributed.deploy.lost-worker-timeout': '0.1s'})\n"
         f"print(*sweep({str(path)!r}, {SMALL}, workers=1)['status'])\n"
     )
     command = [sys.executable, program]

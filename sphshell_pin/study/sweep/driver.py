@@ -244,6 +244,9 @@ def _outcomes(
         # another: a script would begin its sweep again.
         stack.callback(sys.modules.update, {"__main__": sys.modules["__main__"]})
         sys.modules["__main__"] = ModuleType("__main__")
+        # A worker that died and is not back by then, on a busy machine, would never come again.
+        patient = {"distributed.deploy.lost-worker-timeout": "10 days"}
+        stack.enter_context(_need("dask.config").set(patient))
         client = stack.enter_context(contextlib.closing(_client(workers, len(runs), scheduler)))
         submit = partial(client.submit, worker.run_one, plan.job, pure=False)
         groups = deque([list(runs)])
