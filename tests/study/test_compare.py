@@ -23,14 +23,14 @@ def run(label, t, values, figures=None, curves=("force",)):
 
 
 def test_curves_on_different_times_are_compared_as_lines():
-    """Between the rows |t| and a constant differ linearly: extremes and mean square are exact."""
-    first = run("first", [-1, 0, 2], [1, 0, 2])
-    other = run("other", [-0.5, 0.7, 3], [0.25, 0.25, 0.25])
+    """Between the rows |10 t| and a constant differ linearly: extremes and mean square are exact."""
+    first = run("first", [-0.1, 0, 0.2], [1, 0, 2])
+    other = run("other", [-0.05, 0.07, 0.3], [0.25, 0.25, 0.25])
     (curve,) = compare([first, other])[0].curves
-    np.testing.assert_array_equal(curve.difference.t, [-0.5, 0, 0.7, 2])
+    np.testing.assert_array_equal(curve.difference.t, [-0.05, 0, 0.07, 0.2])
     np.testing.assert_allclose(curve.difference.values, [-0.25, 0.25, -0.45, -1.75], atol=1e-15)
-    assert (curve.largest, curve.at) == (1.75, 2)
-    # The integral of (0.25 - |t|)^2 from -0.5 to 2, over its length.
+    assert (curve.largest, curve.at) == (1.75, 0.2)
+    # The integral of (0.25 - |s|)^2 from s = 10 t = -0.5 to 2, over its length.
     square = (0.25**3 + 0.25**3) / 3 + (0.25**3 + 1.75**3) / 3
     assert curve.rms == pytest.approx(np.sqrt(square / 2.5), rel=1e-14)
     assert curve.of_range == pytest.approx(1.75 / 2)
