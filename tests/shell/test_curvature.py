@@ -19,6 +19,18 @@ def ball(rows=8, radius=2.0):
     return sp.Shell.from_geometry(coal.Sphere(radius), segments=2 * rows)
 
 
+def test_what_bends_and_what_does_not_is_counted():
+    """A sheet whose last third is rolled up: the elements before it are flat."""
+    y, x = (one.ravel() for one in np.meshgrid(np.linspace(0, 3, 4), np.linspace(0, 9, 28)))
+    roll = np.maximum(x - 6, 0) / 2
+    vertices = np.stack([np.minimum(x, 6) + 2 * np.sin(roll), y, 2 * (1 - np.cos(roll))], axis=1)
+    first = np.arange(3) + 4 * np.arange(27)[:, None]
+    quads = np.stack([first, first + 4, first + 5, first + 1], axis=-1).reshape(-1, 4)
+    report = sp.Shell(vertices, quads).curvature_report()
+    ((_, flat),) = report.flat_because
+    assert (report.curved, flat) == (27, 54)
+
+
 def test_largest_distance_on_a_ball():
     shell = ball(8, 2.0)
     report = shell.curvature_report()

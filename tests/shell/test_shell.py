@@ -175,3 +175,10 @@ def test_sizes_within_range_find_the_same(exponent: int) -> None:
         assert force_sum(b) / scale**1.5 == pytest.approx(force_sum(a), rel=1e-6, abs=1e-8)
         touched += len(a)
     assert touched > 100
+
+
+@pytest.mark.parametrize("method", ["facets", "smooth"])
+def test_distances_are_negative_inside(method):
+    points = np.array([[0.5, 0.5, 1.2], [0.5, 0.5, 0.9], [1.3, 1.4, 0.5], [0.2, 0.5, 0.6]])
+    found = Shell(CUBE, CUBE_QUADS).closest_points(points, method=method)
+    np.testing.assert_allclose(found.distances, [0.2, -0.1, 0.5, -0.2], atol=1e-15)
