@@ -38,6 +38,15 @@ def test_the_place_of_a_shell_is_found_where_the_contacts_have_it() -> None:
         moved(scene, press(shell=shell))
 
 
+def test_by_default_nothing_but_the_point_is_held() -> None:
+    """A body that spins about the target goes on."""
+    control = sp.CartesianImpedance("ball", [[0.0, 0.0, 0.0]], 50.0, 5.0)
+    spin = [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+    start = models.free_q([0.0, 0.0, 0.0])
+    made = sp.Simulation(sp.Scene(models.ball(0.0))).run(start, spin, 0.1, control)
+    assert made.v[-1] == pytest.approx(spin, abs=1e-12)
+
+
 def test_gains_and_posture_by_joint() -> None:
     model = models.arm()
     first = model.names[1]

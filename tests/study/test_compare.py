@@ -23,7 +23,7 @@ def run(label, t, values, figures=None, curves=("force",)):
 
 
 def test_curves_on_different_times_are_compared_as_lines():
-    """Between the rows |10 t| and a constant differ linearly: extremes and mean square are exact."""
+    """Between rows |10 t| and a constant differ linearly: extremes and mean square are exact."""
     first = run("first", [-0.1, 0, 0.2], [1, 0, 2])
     other = run("other", [-0.05, 0.07, 0.3], [0.25, 0.25, 0.25])
     (curve,) = compare([first, other])[0].curves
