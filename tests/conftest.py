@@ -1,9 +1,10 @@
-"""One browser for all tests, and runs without pictures."""
+"""One browser for all tests, runs without pictures, the same random numbers in any order."""
 
 import os
 import shutil
 import signal
 
+import pinocchio as pin
 import pytest
 
 from tests.scenario.files import without_pictures
@@ -33,6 +34,12 @@ def browser():
         running = driver.chromium.launch(executable_path=program, args=FLAGS)
         yield running
         running.close()
+
+
+@pytest.fixture(autouse=True)
+def same_random_numbers():
+    """Pinocchio draws the same ones in each test, whatever ran before."""
+    pin.seed(0)
 
 
 @pytest.fixture
