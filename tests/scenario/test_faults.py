@@ -26,6 +26,7 @@ FAULTS = [
     (DROP, DROP, "title = ", "", "not valid TOML"),
     # Of two of one name, each is told by its index.
     (DROP + PLATE.replace("0.02]", "-1]"), "", "", "shell[1].primitive.size[2]:", ""),
+    (DROP + PLATE, "", "", "shell[1]:", "two shells have this name"),
     (METHOD, "[run]", f"{ON_METHOD}min = 1\n[run]", "", "is for numbers"),
     (METHOD, "[run]", f'{ON_METHOD}unit = "m"\n[run]', "", "is for numbers"),
 ]

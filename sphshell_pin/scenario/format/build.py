@@ -180,14 +180,15 @@ def build_scenario(
         )
     shells: dict[str, controllers.ShellPlace] = {}
     for i, section in enumerate(scenario.shell):
+        key = reading.item_key("shell", scenario.shell, i)
+        if section.name in shells:
+            raise errors.ScenarioError(path, key, "two shells have this name: rename one")
         shell = (
             (surfaces or {}).get(section.name)
             or _kept_shell(section, reuse)
-            or _build_shell(section, path, reading.item_key("shell", scenario.shell, i))
+            or _build_shell(section, path, key)
         )
         shells[section.name] = shell, section.frame, bodies.to_se3(section.placement)
-    if len(shells) < len(scenario.shell):
-        raise errors.ScenarioError(path, "shell", "two shells share a name")
     for i, contact in enumerate(scenario.contact):
         key = reading.item_key("contact", scenario.contact, i)
         laws = _build_laws(contact, path, key, load)
