@@ -307,7 +307,8 @@ def add_origin(error: Exception, what: str) -> None:
 
 def _shown(value: Any) -> str:
     """Return `value` on one line, cut in the middle where it is long; of NumPy's the numbers."""
-    if type(value).__module__ == "numpy" and value.size < _LONGEST_VALUE:
+    is_numbers = type(value).__module__ == "numpy" and hasattr(value, "tolist")  # no ufunc
+    if is_numbers and value.size < _LONGEST_VALUE:
         value = value.tolist()
     text = " ".join(repr(value).split())
     half = _LONGEST_VALUE // 2

@@ -77,6 +77,7 @@ def test_a_value_is_checked_against_its_description(values, said):
     ("value", "shown"),
     [
         (np.float64(-0.5), "-0.5"),
+        (np.sin, "<ufunc 'sin'>"),
         (np.zeros(3), "[0.0, 0.0, 0.0]"),
         (np.zeros(1000), "array([0., 0., 0., "),
         (SimpleNamespace(size=len), "namespace(size=<built-in function len>)"),

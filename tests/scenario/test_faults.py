@@ -34,7 +34,7 @@ for name, rows in ROWS["replaced"].items():
     whole = TEXTS.get(name) or text_of(f"scenarios/{name}.toml")
     FAULTS += [(whole, *row) for row in rows]
 for kind, rows in ROWS["added"].items():
-    FAULTS += [(DROP, "[run]", f"{HEADS[kind]}{lines}\n[run]", *told) for lines, *told in rows]
+    FAULTS += [(DROP, "[run]", f"{HEADS[kind]}{lines}\n[run]", *found) for lines, *found in rows]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import CancelledError
 from functools import partial
@@ -249,9 +248,8 @@ def _outcomes(
         stack.enter_context(_need("dask.config").set(patient))
         client = stack.enter_context(contextlib.closing(_client(workers, len(runs), scheduler)))
         submit = partial(client.submit, worker.run_one, plan.job, pure=False)
-        groups = deque([list(runs)])
-        while groups:
-            group = groups.popleft()
+        groups = [list(runs)]
+        for group in groups:  # which grows
             numbers = {submit(runs[i]): i for i in group}
             for future in distributed.as_completed(list(numbers), loop=client.loop):
                 number = numbers.pop(future)
